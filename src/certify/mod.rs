@@ -1,0 +1,124 @@
+//! Stage 10: the proof. Replays the commands as the robot will (zero-order hold) from commands, robot and voxels alone.
+//! Never imports `esdf`, `search`, `optimize` or `retime`: a bug there cannot certify itself.
+
+use crate::command::CommandTable;
+use crate::geom::{Aabb, Pose2};
+use crate::map::VoxelMap;
+use crate::robot::RobotModel;
+
+/// Ends within this distance of the goal, m.
+pub const END_POINT_TOLERANCE: f64 = 1e-3;
+/// Ends within this angle of the goal's heading (joints: of their values), rad. 0.1 degrees.
+pub const END_ANGLE_TOLERANCE: f64 = 0.1 * std::f64::consts::PI / 180.0;
+
+/// What the commands must do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Task {
+    /// Where the base starts.
+    pub start: Pose2,
+    /// Joint values at the start.
+    pub start_joints: Vec<f64>,
+    /// Where it must end.
+    pub goal: Goal,
+    /// Clearance to prove, m; has no meaning without a map.
+    pub clearance: f64,
+}
+
+/// Where a motion must end; `None`: anywhere will do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Goal {
+    /// m.
+    pub x: f64,
+    /// m.
+    pub y: f64,
+    /// rad.
+    pub yaw: Option<f64>,
+    /// One per moving joint.
+    pub joints: Vec<Option<f64>>,
+}
+
+/// The verdict, with the figures it rests on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Certificate {
+    /// Asked for, m; `None` without a map.
+    pub clearance_required: Option<f64>,
+    /// Proven lower bound over all instants, shapes and obstacles, m; `None` without a map. Never above the true clearance.
+    pub clearance_proven: Option<f64>,
+    /// Where the least clearance was met.
+    pub closest: Option<Closest>,
+    /// m.
+    pub end_point_error: f64,
+    /// rad; `None` where the goal leaves the heading open.
+    pub end_heading_error: Option<f64>,
+    /// Peaks of every actuator, as written.
+    pub limits: Vec<LimitCheck>,
+    /// Whether no limit (speed, acceleration, jerk, joint position) is exceeded.
+    pub limits_hold: bool,
+    /// Why it is refused: one sentence with numbers each. Empty: certified.
+    pub refusals: Vec<Refusal>,
+}
+
+impl Certificate {
+    /// Certified.
+    pub fn holds(&self) -> bool {
+        self.refusals.is_empty()
+    }
+}
+
+/// A reason to refuse.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Refusal {
+    /// What was violated.
+    pub kind: RefusalKind,
+    /// One sentence with the numbers, the time and the actuator or link.
+    pub message: String,
+    /// When, s.
+    pub time: Option<f64>,
+}
+
+/// What was violated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RefusalKind {
+    /// Clearance not proven.
+    Clearance,
+    /// Speed, acceleration or jerk.
+    Limit,
+    /// Joint position.
+    Position,
+    /// Does not end at the goal, or not at rest.
+    End,
+    /// The table contradicts itself or is not finite.
+    Table,
+}
+
+/// The closest approach found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Closest {
+    /// s.
+    pub time: f64,
+    /// URDF link.
+    pub link: String,
+    /// The obstacle's box; `None`: unseen space beyond the map.
+    pub obstacle: Option<Aabb>,
+    /// True distance at that instant (an upper bound of the least clearance), m; not positive: overlap.
+    pub distance: f64,
+}
+
+/// One actuator's peak against its limit. Wheels in m/s at the rim.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LimitCheck {
+    /// `wheel_left`, `wheel_right`, or the joint's name.
+    pub actuator: String,
+    /// `speed`, `acceleration` or `jerk`.
+    pub quantity: &'static str,
+    /// Largest magnitude.
+    pub peak: f64,
+    /// `None`: given nowhere, not checked.
+    pub limit: Option<f64>,
+}
+
+/// Judges a command table.
+pub fn certify(table: &CommandTable, robot: &RobotModel, map: Option<&VoxelMap>, task: &Task) -> Certificate {
+    let _ = (table, robot, map, task);
+    todo!()
+}

@@ -1,0 +1,172 @@
+//! Diagnostics: what is wrong, where, and what to do. `render` is the only code that formats one.
+
+mod render;
+
+use std::ops::Range;
+use std::sync::Arc;
+
+pub use render::render;
+
+/// A text that a person wrote, kept for quoting.
+#[derive(Debug, PartialEq)]
+pub struct Source {
+    /// Path as the user knows it.
+    pub name: String,
+    /// The whole text.
+    pub text: String,
+}
+
+/// A place in a [`Source`]: byte range.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Span {
+    /// The text it points into.
+    pub source: Arc<Source>,
+    /// Byte range, within the text.
+    pub range: Range<usize>,
+}
+
+impl Span {
+    /// A place; the range is cut to the text.
+    pub fn new(source: &Arc<Source>, range: Range<usize>) -> Self {
+        let end = source.text.len();
+        Self { source: source.clone(), range: range.start.min(end)..range.end.clamp(range.start.min(end), end) }
+    }
+}
+
+/// How a run that failed must end; see `DESIGN` section 2 of the project's contract (`--help` says the same).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// Exit 1: inputs are good, but there is no trajectory, or the certificate is refused.
+    NoTrajectory,
+    /// Exit 2: input unreadable, inconsistent or missing.
+    BadInput,
+}
+
+/// One fault.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Diagnostic {
+    /// Stable identifier, such as `robot/unequal-wheels`.
+    pub code: &'static str,
+    /// What is wrong, with the numbers.
+    pub message: String,
+    /// Where in a text.
+    pub at: Option<Span>,
+    /// A file that has no text to quote (missing, binary).
+    pub file: Option<String>,
+    /// What to do.
+    pub hint: Option<String>,
+    /// Which exit code it asks for.
+    pub severity: Severity,
+    /// Numbers for `report.json`'s `failure`, in order.
+    pub numbers: Vec<(&'static str, serde_json::Value)>,
+}
+
+impl Diagnostic {
+    /// Bad input (exit 2).
+    pub fn error(code: &'static str, message: impl ToString) -> Self {
+        Self {
+            code,
+            message: message.to_string(),
+            at: None,
+            file: None,
+            hint: None,
+            severity: Severity::BadInput,
+            numbers: Vec::new(),
+        }
+    }
+
+    /// Good input, but no trajectory or no certificate (exit 1).
+    pub fn failure(code: &'static str, message: impl ToString) -> Self {
+        Self { severity: Severity::NoTrajectory, ..Self::error(code, message) }
+    }
+
+    /// Adds the place.
+    pub fn at(mut self, span: &Span) -> Self {
+        self.at = Some(span.clone());
+        self
+    }
+
+    /// Adds the place, if known.
+    pub fn maybe_at(mut self, span: Option<&Span>) -> Self {
+        self.at = span.cloned();
+        self
+    }
+
+    /// Adds the file, where there is no text to quote.
+    pub fn file(mut self, name: impl Into<String>) -> Self {
+        self.file = Some(name.into());
+        self
+    }
+
+    /// Adds what to do.
+    pub fn hint(mut self, hint: impl Into<String>) -> Self {
+        self.hint = Some(hint.into());
+        self
+    }
+
+    /// Adds a number for `report.json`.
+    pub fn number(mut self, key: &'static str, value: impl Into<serde_json::Value>) -> Self {
+        self.numbers.push((key, value.into()));
+        self
+    }
+}
+
+/// One or more faults; what a run that fails returns. Never empty.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Diagnostics(pub Vec<Diagnostic>);
+
+impl Diagnostics {
+    /// The worst severity: decides the exit code.
+    pub fn severity(&self) -> Severity {
+        self.0.iter().map(|d| d.severity).max().unwrap_or(Severity::BadInput)
+    }
+}
+
+/// The bridge from a stage's error type to what the user sees.
+pub trait Describe {
+    /// The diagnostic for this error.
+    fn diagnostic(&self) -> Diagnostic;
+}
+
+impl From<Diagnostic> for Diagnostics {
+    fn from(d: Diagnostic) -> Self {
+        Self(vec![d])
+    }
+}
+
+impl<E: Describe> From<E> for Diagnostics {
+    fn from(error: E) -> Self {
+        Self(vec![error.diagnostic()])
+    }
+}
+
+impl<E: Describe> From<Vec<E>> for Diagnostics {
+    fn from(errors: Vec<E>) -> Self {
+        Self(errors.iter().map(Describe::diagnostic).collect())
+    }
+}
+
+/// The known name nearest to a wrong one, if it is near enough to be meant.
+pub fn nearest<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    known
+        .into_iter()
+        .map(|name| (edit_distance(wrong, name), name))
+        .filter(|(d, name)| *d <= 1 + name.len().max(wrong.len()) / 3)
+        .min_by_key(|(d, _)| *d)
+        .map(|(_, name)| name)
+}
+
+fn edit_distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, ca) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, cb) in b.iter().enumerate() {
+            let substituted = diagonal + usize::from(ca != *cb);
+            diagonal = row[j + 1];
+            row[j + 1] = substituted.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    row[b.len()]
+}

@@ -1,0 +1,1 @@
+//! Stage 12: bytes of the output files.

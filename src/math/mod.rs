@@ -1,0 +1,3 @@
+//! Numeric tools that know no robot, map or configuration.
+
+pub mod poly;

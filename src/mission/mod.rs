@@ -1,0 +1,165 @@
+//! Stage 1: what the user asks for. YAML text in, [`Mission`] out; all defaults applied, all numbers SI and finite.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use crate::diag::Diagnostics;
+
+/// A mission, as written plus defaults. File names are as written, relative to the mission's folder.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mission {
+    /// The file's stem.
+    pub name: String,
+    /// robot.yaml, or a .urdf alone.
+    pub robot: PathBuf,
+    /// Where the obstacles are. Absent only with a given path.
+    pub map: Option<MapSpec>,
+    /// Start; with a given path, what of it the mission overrides.
+    pub start: Option<PoseSpec>,
+    /// Goal; likewise.
+    pub goal: Option<PoseSpec>,
+    /// A given path instead of a search.
+    pub path: Option<PathSpec>,
+    /// What the certificate must prove, metres.
+    pub clearance: f64,
+    /// Seconds a command is held.
+    pub sampling_time: f64,
+    /// How wheel speeds are sampled.
+    pub sampling: Sampling,
+    /// How the path is timed.
+    pub time_law: TimeLaw,
+    /// Whether the search may drive backwards.
+    pub reverse: bool,
+    /// Sampling times of the path-error report, seconds, ascending.
+    pub path_error_times: Vec<f64>,
+    /// Overrides of the robot's limits.
+    pub limits: LimitsSpec,
+}
+
+/// `map:` of a mission.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MapSpec {
+    /// The map file, as written.
+    pub file: PathBuf,
+    /// Cell size of point clouds; of grids only to be compared with their own.
+    pub resolution: Option<f64>,
+    /// Slab that holds obstacles. Without it: from 0.02 m to the top of the robot over all postures.
+    pub height: Option<[f64; 2]>,
+    /// What unseen space counts as.
+    pub unknown: Unknown,
+    /// Lower corner of a `.npy` grid.
+    pub origin: Option<[f64; 3]>,
+}
+
+/// What unseen space counts as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unknown {
+    /// An obstacle.
+    Occupied,
+    /// Free.
+    Free,
+}
+
+/// A start or goal. What is `None` or missing the compiler chooses (or takes from the given path).
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PoseSpec {
+    /// Metres. Always there in missions without a given path.
+    pub x: Option<f64>,
+    /// Metres.
+    pub y: Option<f64>,
+    /// Radians.
+    pub yaw: Option<f64>,
+    /// Joint values by name: radians or metres.
+    pub joints: BTreeMap<String, f64>,
+}
+
+/// `path:` of a mission.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PathSpec {
+    /// Cubic Bezier segments, each of four control points (metres).
+    Bezier(Vec<[[f64; 2]; 4]>),
+    /// A CSV file, as written.
+    File(PathBuf),
+}
+
+/// How wheel speeds become held commands; `MATH` section 8.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sampling {
+    /// Travel over the interval divided by its length.
+    Mean,
+    /// The speed at the interval's start.
+    Instant,
+    /// Corrected on the replay (a later issue).
+    Tracked,
+}
+
+/// How a path is timed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TimeLaw {
+    /// The fastest that keeps every limit.
+    Auto,
+    /// Least time under all limits (a later issue).
+    Optimal,
+    /// Convolution profile in the wheel metric (a later issue).
+    Wheel,
+    /// `v' = v_max / (1 + D/2 max|curvature|)`.
+    FixedPoint,
+    /// [CONV] Eq. 5, true arc length.
+    Eq5,
+    /// [CONV] Eq. 2 and 5 as printed.
+    Printed,
+    /// The optimiser's own timing.
+    Minco,
+}
+
+/// Limits by part, each key optional; the mission's win over robot.yaml's, key by key. SI units.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct LimitsSpec {
+    /// Of each driving wheel's rim.
+    pub wheel: ActuatorLimitsSpec,
+    /// By joint name.
+    pub joints: BTreeMap<String, ActuatorLimitsSpec>,
+    /// Of the base.
+    pub base: BaseLimitsSpec,
+}
+
+/// Limits of one actuator. `lower`, `upper` only for joints.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ActuatorLimitsSpec {
+    /// rad or m.
+    pub lower: Option<f64>,
+    /// rad or m.
+    pub upper: Option<f64>,
+    /// Per second.
+    pub speed: Option<f64>,
+    /// Per second squared.
+    pub acceleration: Option<f64>,
+    /// Per second cubed.
+    pub jerk: Option<f64>,
+}
+
+/// `limits.base`.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct BaseLimitsSpec {
+    /// m/s.
+    pub speed: Option<f64>,
+    /// m/s^2.
+    pub acceleration: Option<f64>,
+    /// rad/s.
+    pub angular_speed: Option<f64>,
+    /// rad/s^2.
+    pub angular_acceleration: Option<f64>,
+    /// [SCR] Eq. 14.
+    pub eta: Option<f64>,
+    /// m/s.
+    pub min_speed: Option<f64>,
+}
+
+/// Reads a mission. `name` is the file's path as the user knows it (its stem becomes the mission's name).
+///
+/// # Errors
+/// All faults found: YAML syntax, unknown keys (with the nearest known one), missing keys, values out of range.
+pub fn parse(name: &str, text: &str) -> Result<Mission, Diagnostics> {
+    let _ = (name, text);
+    todo!()
+}

@@ -1,0 +1,1 @@
+//! `compile()`: every stage, in order.

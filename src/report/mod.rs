@@ -1,0 +1,1 @@
+//! Stage 11: what is reported about a compiled mission.

@@ -1,0 +1,190 @@
+//! Stage 2: the robot. URDF and robot.yaml text in, [`RobotModel`] out.
+
+pub mod convex;
+pub mod spec;
+
+use std::path::Path;
+
+use nalgebra::{Isometry3, Unit, Vector3};
+
+use crate::diag::Diagnostics;
+use crate::mission::LimitsSpec;
+pub use convex::Convex;
+
+/// Where a stage gets files it must name itself (meshes). `cli` reads the disk, tests and MCAP attachments memory.
+pub trait Files {
+    /// The bytes of a file; `path` is relative to the folder of the file that names it, already joined.
+    ///
+    /// # Errors
+    /// The I/O error.
+    fn read(&mut self, path: &Path) -> std::io::Result<Vec<u8>>;
+}
+
+/// The robot in its base frame: origin on the floor below the driving wheels' centre, x forward, y left, z up. SI, radians.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RobotModel {
+    /// The robot's name.
+    pub name: String,
+    /// Of the driving wheels, m.
+    pub wheel_radius: f64,
+    /// Distance between the driving wheels, m.
+    pub track_width: f64,
+    /// The URDF's root link, and its pose in the base frame.
+    pub root_link: String,
+    /// base <- root.
+    pub base_from_root: Isometry3<f64>,
+    /// The moving joints, in the order of `robot.yaml`'s `moving`, else of the URDF.
+    pub joints: Vec<MovingJoint>,
+    /// Rigid bodies. Body 0 is the base; a body's parent comes before it.
+    pub bodies: Vec<Body>,
+    /// Convex collision shapes.
+    pub shapes: Vec<Shape>,
+    /// Of each driving wheel's rim (m/s, m/s^2, m/s^3).
+    pub wheel: MotionLimits,
+    /// Of the base; shapes the plan.
+    pub base: BaseLimits,
+    /// Pairs of links whose collision with each other does not count.
+    pub ignore_pairs: Vec<[String; 2]>,
+}
+
+/// A joint that the planner moves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MovingJoint {
+    /// URDF name.
+    pub name: String,
+    /// Metres instead of radians.
+    pub prismatic: bool,
+    /// Least position; negative infinity for `continuous`. Mimics' limits are folded in.
+    pub lower: f64,
+    /// Greatest position.
+    pub upper: f64,
+    /// Speed, acceleration, jerk.
+    pub limits: MotionLimits,
+}
+
+/// Limits of one actuator as given; `None`: not given anywhere, so not checked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotionLimits {
+    /// Per second.
+    pub speed: Option<f64>,
+    /// Per second squared.
+    pub acceleration: Option<f64>,
+    /// Per second cubed.
+    pub jerk: Option<f64>,
+}
+
+impl MotionLimits {
+    /// Limits to plan with: a missing acceleration is speed/1 s, a missing jerk acceleration/0.25 s; a missing speed 1.
+    pub fn planning(&self) -> [f64; 3] {
+        let speed = self.speed.unwrap_or(1.0);
+        let acceleration = self.acceleration.unwrap_or(speed);
+        [speed, acceleration, self.jerk.unwrap_or(acceleration / 0.25)]
+    }
+}
+
+/// Limits of the base; all set (defaults of robot.yaml applied).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BaseLimits {
+    /// m/s.
+    pub speed: f64,
+    /// m/s^2.
+    pub acceleration: f64,
+    /// rad/s.
+    pub angular_speed: f64,
+    /// rad/s^2.
+    pub angular_acceleration: f64,
+    /// [SCR] Eq. 14: turning speed falls with driving speed, `omega <= 2 eta (v_max - v) / D`.
+    pub eta: f64,
+    /// m/s; [SCR] section V-C.
+    pub min_speed: f64,
+}
+
+/// A rigid body: links joined by fixed (or held) joints. Its frame is the child frame of the joint that moves it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Body {
+    /// Its first link.
+    pub link: String,
+    /// Index of the parent body; 0 for the base itself.
+    pub parent: usize,
+    /// parent body <- joint frame at joint value 0.
+    pub origin: Isometry3<f64>,
+    /// How it moves against its parent; `None` only for body 0.
+    pub motion: Option<BodyMotion>,
+}
+
+/// Value of the body's own joint = `multiplier * q[joint] + offset` (mimics included).
+#[derive(Debug, Clone, PartialEq)]
+pub struct BodyMotion {
+    /// Index into [`RobotModel::joints`].
+    pub joint: usize,
+    /// Mimic factor.
+    pub multiplier: f64,
+    /// Mimic offset.
+    pub offset: f64,
+    /// In the joint frame.
+    pub axis: Unit<Vector3<f64>>,
+    /// Slides along the axis instead of turning about it.
+    pub prismatic: bool,
+}
+
+/// A convex collision shape fixed to a body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shape {
+    /// The URDF link it belongs to.
+    pub link: String,
+    /// Index into [`RobotModel::bodies`].
+    pub body: usize,
+    /// body <- shape.
+    pub pose: Isometry3<f64>,
+    /// About its own centre.
+    pub convex: Convex,
+}
+
+impl RobotModel {
+    /// Poses of all bodies in the base frame at joint values `q` (one per moving joint); `out` is cleared first.
+    pub fn body_poses(&self, q: &[f64], out: &mut Vec<Isometry3<f64>>) {
+        out.clear();
+        for body in &self.bodies {
+            let Some(motion) = &body.motion else {
+                out.push(body.origin);
+                continue;
+            };
+            let value = motion.multiplier * q[motion.joint] + motion.offset;
+            let moved = if motion.prismatic {
+                Isometry3::translation(motion.axis.x * value, motion.axis.y * value, motion.axis.z * value)
+            } else {
+                Isometry3::from_parts(Default::default(), nalgebra::UnitQuaternion::from_axis_angle(&motion.axis, value))
+            };
+            let parent = out[body.parent];
+            out.push(parent * body.origin * moved);
+        }
+    }
+
+    /// Poses of all shapes in the base frame at joint values `q`.
+    pub fn shape_poses(&self, q: &[f64]) -> Vec<Isometry3<f64>> {
+        let mut bodies = Vec::with_capacity(self.bodies.len());
+        self.body_poses(q, &mut bodies);
+        self.shapes.iter().map(|s| bodies[s.body] * s.pose).collect()
+    }
+}
+
+/// What [`parse`] reads.
+pub struct RobotInputs<'a> {
+    /// robot.yaml, already read by [`spec::parse`]; `RobotSpec::default()` where the mission names a bare URDF.
+    pub spec: &'a spec::RobotSpec,
+    /// Path and text of the URDF.
+    pub urdf: (&'a str, &'a str),
+    /// Reader for meshes.
+    pub files: &'a mut dyn Files,
+    /// The mission's overrides.
+    pub overrides: &'a LimitsSpec,
+}
+
+/// Reads a robot.
+///
+/// # Errors
+/// All faults found, with file and line.
+pub fn parse(inputs: RobotInputs<'_>) -> Result<RobotModel, Diagnostics> {
+    let _ = inputs.urdf;
+    todo!()
+}

@@ -1,0 +1,87 @@
+//! The planned motion: what `optimize` and given paths make, and `retime` reads.
+//!
+//! A [`Trajectory`] is a list of [`Leg`]s, each from rest to rest. What may jump between legs: the direction of driving, the
+//! kind of motion. What may not: position, heading (radians, not wrapped), joint values.
+
+use crate::geom::Pose2;
+use crate::math::poly::PiecewisePoly;
+
+/// Planned motion from start to goal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trajectory {
+    /// Never empty; a mission whose start is its goal has one [`Leg::Still`] that moves nothing.
+    pub legs: Vec<Leg>,
+    /// Where it comes from.
+    pub source: TrajectorySource,
+    /// How the optimiser ended; `None` where it did not run.
+    pub optimiser: Option<OptimiserOutcome>,
+}
+
+/// Where a trajectory comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TrajectorySource {
+    /// The optimiser.
+    Optimised,
+    /// The search's path, driven stop, spin, go.
+    Search,
+    /// The mission's own path.
+    Given,
+}
+
+/// How the optimiser ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OptimiserOutcome {
+    /// Polynomial pieces over all legs.
+    pub pieces: usize,
+    /// L-BFGS iterations over all legs.
+    pub iterations: usize,
+    /// The worst over all legs.
+    pub ending: Ending,
+    /// Final cost, summed over legs.
+    pub cost: f64,
+}
+
+/// How an iteration ended; worse endings compare greater.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Ending {
+    /// Gradient or cost change below the tolerance.
+    Converged,
+    /// Out of iterations.
+    IterationLimit,
+    /// The line search found no descent.
+    LineSearchStalled,
+}
+
+/// A stretch of motion from rest to rest.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Leg {
+    /// Driving along a plane curve.
+    Drive(DriveLeg),
+    /// The base turns on the spot or stands; joints move in proportion.
+    Still(StillLeg),
+}
+
+/// Driving along a plane curve; heading is the direction of motion, plus pi when backwards.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DriveLeg {
+    /// Dimensions x, y (m), then one per moving joint (rad or m). Parameter: seconds of the optimiser's own timing, or any
+    /// parameter (given paths). The first derivative of (x, y) vanishes nowhere; curvature is continuous within a leg.
+    pub curve: PiecewisePoly,
+    /// Drives backwards.
+    pub reverse: bool,
+    /// Heading at the leg's start, radians; fixes the branch of the heading for the leg.
+    pub yaw_start: f64,
+}
+
+/// On the spot: everything moves in proportion to one law.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StillLeg {
+    /// Where it begins.
+    pub pose: Pose2,
+    /// Heading at the end, not wrapped: turns by `yaw_end - pose.yaw`.
+    pub yaw_end: f64,
+    /// Joint values at the start.
+    pub joints_from: Vec<f64>,
+    /// Joint values at the end.
+    pub joints_to: Vec<f64>,
+}
