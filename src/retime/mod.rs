@@ -25,7 +25,11 @@ pub enum RetimeError {}
 ///
 /// # Errors
 /// The law cannot time this path; the reason says why and which law can.
-pub fn retime(trajectory: &Trajectory, robot: &RobotModel, options: &RetimeOptions) -> Result<MotionProfile, RetimeError> {
+pub fn retime(
+    trajectory: &Trajectory,
+    robot: &RobotModel,
+    options: &RetimeOptions,
+) -> Result<MotionProfile, RetimeError> {
     let _ = (trajectory, robot, options);
     todo!()
 }

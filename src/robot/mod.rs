@@ -153,7 +153,10 @@ impl RobotModel {
             let moved = if motion.prismatic {
                 Isometry3::translation(motion.axis.x * value, motion.axis.y * value, motion.axis.z * value)
             } else {
-                Isometry3::from_parts(Default::default(), nalgebra::UnitQuaternion::from_axis_angle(&motion.axis, value))
+                Isometry3::from_parts(
+                    Default::default(),
+                    nalgebra::UnitQuaternion::from_axis_angle(&motion.axis, value),
+                )
             };
             let parent = out[body.parent];
             out.push(parent * body.origin * moved);
