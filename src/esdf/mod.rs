@@ -1,32 +1,141 @@
 //! Stage 4: signed distance to the obstacles' *surface* (the cubes of the occupied cells), on the lattice of cell corners.
+//!
+//! `MATH` section 4: the corners of occupied cubes are the sites of an exact Euclidean distance transform over the lattice of
+//! cell corners. The nearest point of a cube to a lattice node is always a lattice node, so the values are the exact distance
+//! to the union of the cubes, not to the cells' centres. Inside, the corners of free cubes are the sites.
+
+mod interpolate;
+mod transform;
 
 use crate::map::VoxelMap;
+use crate::mission::Unknown;
 
-/// Signed Euclidean distance at the corners of the map's cells.
+/// Signed Euclidean distance at the corners of the map's cells, m. Node (i, j, k) lies at
+/// `origin + resolution * (i, j, k)`; there are `dims + 1` nodes along each axis of the map.
 pub struct Esdf {
     pub(crate) resolution: f64,
     pub(crate) origin: [f64; 3],
     pub(crate) nodes: [usize; 3],
+    /// Whether space beyond the grid in x and y is an obstacle.
+    pub(crate) outside: Unknown,
+    /// Node (i, j, k) at `(i * nodes[1] + j) * nodes[2] + k`.
     pub(crate) values: Vec<f32>,
 }
 
-/// Builds the field.
+/// A distance that no obstacle is near enough to bound, m: what an empty map returns.
+pub const FAR: f32 = 1.0e4;
+
+/// Builds the field of a map: exact at every node, O(number of nodes).
 pub fn build(map: &VoxelMap) -> Esdf {
-    let _ = map;
-    todo!()
+    let nodes = map.dims.map(|d| d + 1);
+    let values = transform::signed_distance(map, nodes);
+    Esdf { resolution: map.resolution, origin: map.origin, nodes, outside: map.outside, values }
 }
 
 impl Esdf {
-    /// Distance at a point by trilinear interpolation, m: positive outside, negative inside, to the obstacles' surface.
-    /// At the nodes exact; between them within sqrt(3)/2 of a cell.
-    pub fn distance(&self, p: [f64; 3]) -> f64 {
-        let _ = (p, self.resolution, self.origin, self.nodes, &self.values);
-        todo!()
+    /// Side of a cell, m.
+    pub fn resolution(&self) -> f64 {
+        self.resolution
     }
 
-    /// Distance and its gradient, from the same eight corners.
-    pub fn distance_gradient(&self, p: [f64; 3]) -> (f64, [f64; 3]) {
-        let _ = p;
-        todo!()
+    /// Value at a node: exact distance, m.
+    pub fn at_node(&self, node: [usize; 3]) -> f64 {
+        f64::from(self.values[(node[0] * self.nodes[1] + node[1]) * self.nodes[2] + node[2]])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point3;
+    use proptest::prelude::*;
+
+    fn random_map(dims: [usize; 3], cells: &[usize], outside: Unknown) -> VoxelMap {
+        let mut map = VoxelMap::new(0.25, [-1.0, 2.0, 0.5], dims, outside);
+        let total = dims[0] * dims[1] * dims[2];
+        for cell in cells.iter().map(|c| c % total) {
+            map.occupy([cell / (dims[1] * dims[2]), cell / dims[2] % dims[1], cell % dims[2]]);
+        }
+        map
+    }
+
+    fn cubes(map: &VoxelMap, occupied: bool) -> Vec<crate::geom::Aabb> {
+        let [nx, ny, nz] = map.dims;
+        let cells = (0..nx).flat_map(|i| (0..ny).flat_map(move |j| (0..nz).map(move |k| [i, j, k])));
+        cells.filter(|c| map.occupied(*c) == occupied).map(|c| map.cube(c)).collect()
+    }
+
+    /// Signed distance from a point of the grid by looking at every cube. Space above and below the grid is free.
+    fn brute_force(map: &VoxelMap, p: [f64; 3]) -> f64 {
+        let p3 = Point3::from(p);
+        let out = cubes(map, true).iter().map(|c| c.distance(&p3)).fold(f64::INFINITY, f64::min);
+        let bounds = map.bounds();
+        let edge = (0..2).map(|a| (p[a] - bounds.min[a]).min(bounds.max[a] - p[a])).fold(f64::INFINITY, f64::min);
+        let mut inside = cubes(map, false).iter().map(|c| c.distance(&p3)).fold(f64::INFINITY, f64::min);
+        inside = inside.min(p[2] - bounds.min[2]).min(bounds.max[2] - p[2]);
+        if map.outside == Unknown::Occupied {
+            out.min(edge) - if out > 0.0 { 0.0 } else { inside }
+        } else {
+            out - if out > 0.0 { 0.0 } else { inside.min(edge) }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn every_node_equals_brute_force(
+            dims in (1usize..7, 1usize..7, 1usize..7), cells in prop::collection::vec(any::<usize>(), 1..150),
+            occupied in any::<bool>(),
+        ) {
+            let outside = if occupied { Unknown::Occupied } else { Unknown::Free };
+            let map = random_map([dims.0, dims.1, dims.2], &cells, outside);
+            let field = build(&map);
+            for i in 0..=dims.0 { for j in 0..=dims.1 { for k in 0..=dims.2 {
+                let p = [0, 1, 2].map(|a| map.origin[a] + map.resolution * [i, j, k][a] as f64);
+                let expected = brute_force(&map, p);
+                let found = field.at_node([i, j, k]);
+                prop_assert!((found - expected).abs() < 1e-5, "node {i} {j} {k}: {found} vs {expected}");
+                prop_assert!((field.distance(p) - expected).abs() < 1e-5);
+            }}}
+        }
+
+        #[test]
+        fn interpolation_stays_within_its_stated_loss_and_its_gradient_matches(
+            cells in prop::collection::vec(any::<usize>(), 1..20), u in prop::array::uniform3(-0.4f64..1.4),
+        ) {
+            let map = random_map([6, 5, 4], &cells, Unknown::Free);
+            let field = build(&map);
+            let bounds = map.bounds();
+            let p = [0, 1, 2].map(|a| bounds.min[a] + u[a] * (bounds.max[a] - bounds.min[a]));
+            let inside = u.iter().all(|v| (0.0..=1.0).contains(v));
+            let out = cubes(&map, true).iter().map(|c| c.distance(&Point3::from(p))).fold(f64::INFINITY, f64::min);
+            let (value, gradient) = field.distance_gradient(p);
+            prop_assert_eq!(value, field.distance(p));
+            prop_assert!(value <= out + 0.87 * map.resolution, "{} of {}", value, out);
+            if inside && out > 0.0 {
+                prop_assert!(value >= out - 0.87 * map.resolution);
+            }
+            for a in 0..3 {
+                // away from the cell faces, where the gradient jumps
+                let fraction = ((p[a] - map.origin[a]) / map.resolution).fract().abs();
+                prop_assume!(fraction > 1e-4 && fraction < 1.0 - 1e-4);
+            }
+            let h = 1e-6;
+            for a in 0..3 {
+                let (mut low, mut high) = (p, p);
+                low[a] -= h;
+                high[a] += h;
+                let numeric = (field.distance(high) - field.distance(low)) / (2.0 * h);
+                prop_assert!((numeric - gradient[a]).abs() < 1e-4, "axis {a}: {} vs {numeric}", gradient[a]);
+            }
+        }
+    }
+
+    #[test]
+    fn an_empty_map_is_far_from_everything_but_its_edge() {
+        let free = build(&VoxelMap::new(0.1, [0.0; 3], [4, 4, 4], Unknown::Free));
+        assert_eq!(free.distance([0.2, 0.2, 0.2]), f64::from(FAR));
+        let walled = build(&VoxelMap::new(0.1, [0.0; 3], [40, 40, 4], Unknown::Occupied));
+        assert!((walled.distance([0.5, 2.0, 0.2]) - 0.5).abs() < 1e-6);
+        assert!((walled.distance([-0.3, 2.0, 0.2]) + 0.3).abs() < 1e-6);
     }
 }
