@@ -201,7 +201,13 @@ mod tests {
         }
     }
 
-    fn between(a: &Convex, pose_a: &Isometry3<f64>, b: &Convex, pose_b: &Isometry3<f64>, threshold: Option<f64>) -> Gap {
+    fn between(
+        a: &Convex,
+        pose_a: &Isometry3<f64>,
+        b: &Convex,
+        pose_b: &Isometry3<f64>,
+        threshold: Option<f64>,
+    ) -> Gap {
         let world = |shape: &Convex, pose: &Isometry3<f64>, d: &Vector3<f64>| {
             pose.translation.vector + pose.rotation * shape.support(&pose.rotation.inverse_transform_vector(d))
         };
@@ -252,7 +258,8 @@ mod tests {
     fn touching_and_containing_bodies_have_no_gap() {
         let small = Convex::Box { half: [0.1; 3] };
         let large = Convex::Sphere { radius: 2.0 };
-        let turned = Isometry3::from_parts(Point3::new(0.3, 0.2, 0.1).into(), UnitQuaternion::from_euler_angles(0.4, 0.5, 0.6));
+        let turned =
+            Isometry3::from_parts(Point3::new(0.3, 0.2, 0.1).into(), UnitQuaternion::from_euler_angles(0.4, 0.5, 0.6));
         assert_eq!(between(&small, &turned, &large, &Isometry3::identity(), None).upper, 0.0);
     }
 }

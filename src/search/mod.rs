@@ -1,6 +1,30 @@
 //! Stage 6: a drivable path on a lattice over (x, y, yaw, posture).
+//!
+//! Resolution-complete: [`search`] returns a path, or the proof that none exists on the lattice ([`lattice`]: positions 5 cm
+//! apart, 72 headings; [`posture`]: 64 values of a joint), every move checked exactly against the occupied cells' cubes as a
+//! sweep. ([SCR] takes a hybrid A* for its initial path; see [`astar`] for what replaces its fourth dimension.)
 
-use crate::geom::Pose2;
+mod astar;
+mod collide;
+mod heuristic;
+mod joints;
+mod lattice;
+mod obstacles;
+mod posture;
+mod route;
+mod shortcut;
+
+use crate::diag::{Describe, Diagnostic};
+use crate::esdf::Esdf;
+use crate::geom::{Pose2, wrap_angle};
+use crate::map::VoxelMap;
+use crate::robot::RobotModel;
+
+pub use collide::Contact;
+use collide::{BaseMotion, Collider};
+use lattice::Lattice;
+use posture::{Bits, PostureGrid};
+use shortcut::Shortcutter;
 
 /// A path on the lattice, joined to the exact start and goal. Between consecutive states the motion is linear in joint
 /// space: a spin or a straight drive, joints in proportion.
@@ -38,5 +62,392 @@ impl SearchPath {
     /// Distance driven, m.
     pub fn length(&self) -> f64 {
         self.states.windows(2).map(|w| w[0].pose.distance(w[1].pose)).sum()
+    }
+}
+
+/// Where from and where to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Query {
+    /// Exact start pose, map frame.
+    pub start: Pose2,
+    /// Joint values at the start; `None`: any.
+    pub start_joints: Vec<Option<f64>>,
+    /// Exact goal position; its yaw only where `goal_yaw` says so.
+    pub goal: Pose2,
+    /// Heading at the goal; `None`: any.
+    pub goal_yaw: Option<f64>,
+    /// Joint values at the goal; `None`: any.
+    pub goal_joints: Vec<Option<f64>>,
+}
+
+/// How to search.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SearchOptions {
+    /// Clearance that every state and move keeps, m.
+    pub clearance: f64,
+    /// Whether backing up is allowed.
+    pub reverse: bool,
+}
+
+/// Why there is no path.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SearchError {
+    /// The start does not keep the clearance.
+    #[error("the start is {}", blocked(.contact, *.clearance))]
+    StartBlocked {
+        /// With what.
+        contact: Contact,
+        /// Asked for, m.
+        clearance: f64,
+    },
+    /// The goal does not keep the clearance.
+    #[error("the goal is {}", blocked(.contact, *.clearance))]
+    GoalBlocked {
+        /// With what.
+        contact: Contact,
+        /// Asked for, m.
+        clearance: f64,
+    },
+    /// Start or goal lie beyond the map where that counts as an obstacle.
+    #[error(
+        "the {which} ({x:.3}, {y:.3}) lies outside the map, which spans x {:.3} to {:.3}, y {:.3} to {:.3} m",
+        bounds[0], bounds[1], bounds[2], bounds[3]
+    )]
+    OffMap {
+        /// `start` or `goal`.
+        which: &'static str,
+        /// m.
+        x: f64,
+        /// m.
+        y: f64,
+        /// x from, to, y from, to, m.
+        bounds: [f64; 4],
+    },
+    /// Every state that can be reached was looked at.
+    #[error(
+        "no way to the goal: all {expanded} states that can be reached on the lattice (5 cm, 5 degrees, 64 postures a joint) \
+         were searched{}", narrowest_way(.narrowest)
+    )]
+    Exhausted {
+        /// States expanded.
+        expanded: usize,
+        /// The reached pose nearest to the goal.
+        closest: Pose2,
+        /// The widest way in the plane: radius that fits at its narrowest place, and that place, m.
+        narrowest: Option<(f64, [f64; 2])>,
+        /// Radius of the base's core plus clearance: what would have to fit at least, m.
+        core: f64,
+    },
+    /// Out of memory that the search allows itself.
+    #[error("gave up after {labels} partial paths: neither a way was found nor its absence proven")]
+    Limit {
+        /// Labels made.
+        labels: usize,
+    },
+}
+
+fn blocked(contact: &Contact, clearance: f64) -> String {
+    let with = match contact.obstacle {
+        Some(b) => format!(
+            "the obstacle at x {:.2}..{:.2}, y {:.2}..{:.2}, z {:.2}..{:.2} m",
+            b.min[0], b.max[0], b.min[1], b.max[1], b.min[2], b.max[2]
+        ),
+        None => "the map's edge".to_owned(),
+    };
+    let link = &contact.link;
+    if contact.clearance <= 0.0 {
+        format!("in collision: link `{link}` is {:.3} m deep in {with}", -contact.clearance)
+    } else {
+        format!("too close: link `{link}` has {:.3} m to {with}, {clearance} m are asked for", contact.clearance)
+    }
+}
+
+fn narrowest_way(narrowest: &Option<(f64, [f64; 2])>) -> String {
+    match narrowest {
+        Some((radius, [x, y])) => {
+            format!("; the widest way there narrows to {:.2} m about ({x:.2}, {y:.2})", 2.0 * radius.max(0.0))
+        }
+        None => String::new(),
+    }
+}
+
+impl Describe for SearchError {
+    fn diagnostic(&self) -> Diagnostic {
+        let contact = |code, c: &Contact, clearance: f64| {
+            Diagnostic::failure(code, self)
+                .hint("move the pose, change the joints there, or lower `clearance_m`")
+                .number("link", c.link.clone())
+                .number("clearance_m", c.clearance)
+                .number("clearance_required_m", clearance)
+        };
+        match self {
+            Self::StartBlocked { contact: c, clearance } => contact("search/start-blocked", c, *clearance),
+            Self::GoalBlocked { contact: c, clearance } => contact("search/goal-blocked", c, *clearance),
+            Self::OffMap { which, x, y, .. } => Diagnostic::failure("search/off-map", self)
+                .hint("poses are in the map's frame, metres; `map: {unknown: free}` lets the robot leave the seen area")
+                .number("pose", *which)
+                .number("x_m", *x)
+                .number("y_m", *y),
+            Self::Exhausted { expanded, closest, narrowest, core } => {
+                let mut d = Diagnostic::failure("search/no-way", self)
+                    .hint("lower `clearance_m`, allow `reverse: true`, free the goal's heading or joints, or look at the map there")
+                    .number("expanded", *expanded)
+                    .number("closest_x_m", closest.x)
+                    .number("closest_y_m", closest.y)
+                    .number("closest_yaw_rad", closest.yaw);
+                if let Some((radius, [x, y])) = narrowest {
+                    d = d
+                        .number("narrowest_gap_m", 2.0 * radius.max(0.0))
+                        .number("narrowest_gap_x_m", *x)
+                        .number("narrowest_gap_y_m", *y)
+                        .number("least_gap_needed_m", 2.0 * core);
+                }
+                d
+            }
+            Self::Limit { labels } => Diagnostic::failure("search/limit", self)
+                .hint("use a coarser map or split the mission")
+                .number("labels", *labels),
+        }
+    }
+}
+
+/// A drivable path from start to goal, each move with at least `options.clearance` metres of clearance. Deterministic.
+///
+/// # Errors
+/// [`SearchError`] says which pose is blocked and by what, or that there is no way at this resolution.
+pub fn search(
+    map: &VoxelMap,
+    esdf: &Esdf,
+    robot: &RobotModel,
+    query: &Query,
+    options: &SearchOptions,
+) -> Result<SearchPath, SearchError> {
+    let near: Vec<f64> =
+        query.start_joints.iter().zip(&robot.joints).map(|(q, j)| q.unwrap_or(0f64.clamp(j.lower, j.upper))).collect();
+    let grid = PostureGrid::new(robot, &near);
+    if grid.count() <= 64 {
+        search_postures::<1>(map, esdf, robot, query, options, grid)
+    } else {
+        search_postures::<{ posture::MOST_POSTURES / 64 }>(map, esdf, robot, query, options, grid)
+    }
+}
+
+/// Clearance of one pose and posture: the nearest obstacle within a metre, exactly.
+pub fn contact(map: &VoxelMap, esdf: &Esdf, robot: &RobotModel, pose: Pose2, joints: &[f64]) -> Contact {
+    let grid = PostureGrid::new(robot, joints);
+    if grid.count() <= 64 {
+        Collider::<1>::new(robot, esdf, map, 0.0, grid).contact(pose, joints)
+    } else {
+        Collider::<{ posture::MOST_POSTURES / 64 }>::new(robot, esdf, map, 0.0, grid).contact(pose, joints)
+    }
+}
+
+fn search_postures<const W: usize>(
+    map: &VoxelMap,
+    esdf: &Esdf,
+    robot: &RobotModel,
+    query: &Query,
+    options: &SearchOptions,
+    grid: PostureGrid,
+) -> Result<SearchPath, SearchError> {
+    let collider = Collider::<W>::new(robot, esdf, map, options.clearance, grid);
+    let bounds = map.bounds();
+    for (which, pose) in [("start", query.start), ("goal", query.goal)] {
+        let inside =
+            (bounds.min[0]..=bounds.max[0]).contains(&pose.x) && (bounds.min[1]..=bounds.max[1]).contains(&pose.y);
+        if !inside {
+            let [min, max] = [bounds.min, bounds.max];
+            return Err(SearchError::OffMap { which, x: pose.x, y: pose.y, bounds: [min[0], max[0], min[1], max[1]] });
+        }
+    }
+    let clearance = options.clearance;
+    let start_postures = free_postures(&collider, query.start, &query.start_joints)
+        .map_err(|contact| SearchError::StartBlocked { contact, clearance })?;
+    let goal_postures =
+        goal_postures(&collider, query).map_err(|contact| SearchError::GoalBlocked { contact, clearance })?;
+
+    let lattice = Lattice::new(map);
+    let ball = heuristic::core_ball(robot);
+    let core = heuristic::core_clearance(&lattice, esdf, ball);
+    let goal = [query.goal.x, query.goal.y];
+    let cost_to_go = heuristic::CostToGo::new(&lattice, &core, map.resolution, clearance, goal);
+    let astar = astar::AStar {
+        lattice: &lattice,
+        collider: &collider,
+        cost_to_go: &cost_to_go,
+        core: &core,
+        query,
+        options,
+        start_postures,
+        goal_postures,
+    };
+    let (route, expanded) = match astar.search() {
+        astar::Outcome::Found { route, expanded } => (route, expanded),
+        astar::Outcome::Limit { labels } => return Err(SearchError::Limit { labels }),
+        astar::Outcome::Exhausted { closest, expanded } => {
+            let narrowest = heuristic::bottleneck(&lattice, &core, ball.1, [query.start.x, query.start.y], goal);
+            return Err(SearchError::Exhausted { expanded, closest, narrowest, core: ball.1 + clearance });
+        }
+    };
+    let shortcutter =
+        Shortcutter { collider: &collider, start_postures, goal_postures, open_end: query.goal_yaw.is_none() };
+    // The search checked the same sweeps, cut at other places: a route may fail here only by the tolerance of the checks.
+    let checked = shortcutter.check(route).ok_or(SearchError::Limit { labels: expanded })?;
+    let checked = shortcutter.shorten(checked);
+    Ok(with_joints(&collider, robot, query, &checked, start_postures, goal_postures, expanded))
+}
+
+/// Postures that are free in a pose and agree with what is asked for; else what is in the way of the posture asked for.
+fn free_postures<const W: usize>(
+    collider: &Collider<'_, W>,
+    pose: Pose2,
+    joints: &[Option<f64>],
+) -> Result<Bits<W>, Contact> {
+    let mut wanted = collider.free(&BaseMotion { from: pose, to: pose });
+    let asked = asked_posture(&collider.grid, joints);
+    let free = wanted;
+    for p in free.iter() {
+        if !agrees(&collider.grid, p, joints) {
+            wanted.remove(p);
+        }
+    }
+    if wanted.is_empty() { Err(collider.contact(pose, &asked)) } else { Ok(wanted) }
+}
+
+/// The posture with the values asked for; where none is asked for, the middle of the range.
+fn asked_posture(grid: &PostureGrid, joints: &[Option<f64>]) -> Vec<f64> {
+    let middle = grid.joints(grid.count() / 2);
+    joints.iter().zip(middle).map(|(asked, middle)| asked.unwrap_or(middle)).collect()
+}
+
+/// Whether a sampled posture is the nearest one to what is asked for.
+fn agrees(grid: &PostureGrid, posture: usize, joints: &[Option<f64>]) -> bool {
+    let own = grid.joints(posture);
+    let wanted: Vec<f64> = joints.iter().zip(&own).map(|(asked, own)| asked.unwrap_or(*own)).collect();
+    grid.nearest(&wanted) == posture
+}
+
+/// Postures free at the goal, in any heading that will do.
+fn goal_postures<const W: usize>(collider: &Collider<'_, W>, query: &Query) -> Result<Bits<W>, Contact> {
+    if let Some(yaw) = query.goal_yaw {
+        return free_postures(collider, Pose2 { yaw, ..query.goal }, &query.goal_joints);
+    }
+    let mut all = Bits::EMPTY;
+    let mut blocked = None;
+    for heading in 0..lattice::HEADINGS as i32 {
+        match free_postures(collider, Pose2 { yaw: lattice::heading_angle(heading), ..query.goal }, &query.goal_joints)
+        {
+            Ok(postures) => all = all.or(postures),
+            Err(contact) => blocked = Some(contact),
+        }
+    }
+    match blocked {
+        Some(contact) if all.is_empty() => Err(contact),
+        _ => Ok(all),
+    }
+}
+
+/// The route with the joints' path: states after each piece, those that only continue the one before left out.
+fn with_joints<const W: usize>(
+    collider: &Collider<'_, W>,
+    robot: &RobotModel,
+    query: &Query,
+    checked: &shortcut::CheckedRoute<W>,
+    start_postures: Bits<W>,
+    goal_postures: Bits<W>,
+    expanded: usize,
+) -> SearchPath {
+    let pieces = checked.route.pieces();
+    let masks = checked.masks();
+    let rates: Vec<usize> = pieces.iter().map(|piece| steps_in_time(robot, &collider.grid, piece)).collect();
+    let postures =
+        joints::choose(&collider.neighbours, collider.grid.count(), &masks, &rates, start_postures, goal_postures)
+            .expect("the checked route passes postures from start to goal");
+    let exact = |asked: &[Option<f64>], posture: usize| -> Vec<f64> {
+        asked.iter().zip(collider.grid.joints(posture)).map(|(a, own)| a.unwrap_or(own)).collect()
+    };
+    let first = postures[0];
+    let mut path = SearchPath {
+        states: vec![SearchState { pose: query.start, joints: exact(&query.start_joints, first) }],
+        moves: Vec::new(),
+        expanded,
+    };
+    path.then_to(SearchState { pose: query.start, joints: collider.grid.joints(first) }, SearchMove::Still);
+    let drive_reverse = reverse_of_pieces(&checked.route, &pieces);
+    for (k, piece) in pieces.iter().enumerate() {
+        let kind = match drive_reverse[k] {
+            None => SearchMove::Still,
+            Some(false) => SearchMove::Forward,
+            Some(true) => SearchMove::Reverse,
+        };
+        path.then_to(SearchState { pose: piece.to, joints: collider.grid.joints(postures[k + 1]) }, kind);
+    }
+    let last = postures[postures.len() - 1];
+    let end = path.states[path.states.len() - 1].pose;
+    let yaw = query.goal_yaw.map_or(end.yaw, |yaw| end.yaw + wrap_angle(yaw - end.yaw));
+    let end = Pose2 { yaw, x: query.goal.x, y: query.goal.y };
+    path.states.last_mut().expect("never empty").pose = end;
+    path.then_to(SearchState { pose: end, joints: exact(&query.goal_joints, last) }, SearchMove::Still);
+    if path.moves.is_empty() {
+        let only = path.states[0].clone();
+        path.states.push(only);
+        path.moves.push(SearchMove::Still);
+    }
+    path
+}
+
+/// Per piece: `None` for a turn, else whether it backs up.
+fn reverse_of_pieces(route: &route::Route, pieces: &[BaseMotion]) -> Vec<Option<bool>> {
+    let mut drive = 0;
+    let mut out = Vec::with_capacity(pieces.len());
+    for piece in pieces {
+        let driving = piece.from.distance(piece.to) > 0.0;
+        out.push(driving.then(|| route.reverse[drive]));
+        if driving && route.corners[drive + 1] == [piece.to.x, piece.to.y] {
+            drive += 1;
+        }
+    }
+    out
+}
+
+/// Posture steps that there is time for while the base goes through a piece.
+fn steps_in_time(robot: &RobotModel, grid: &PostureGrid, piece: &BaseMotion) -> usize {
+    let time = piece.from.distance(piece.to) / robot.base.speed
+        + (piece.to.yaw - piece.from.yaw).abs() / robot.base.angular_speed.max(1e-6);
+    let steps = robot.joints.iter().enumerate().map(|(m, joint)| {
+        let step = grid.step(m);
+        if step > 0.0 { 0.7 * joint.limits.planning()[0] * time / step } else { f64::INFINITY }
+    });
+    steps.fold(f64::INFINITY, f64::min).min(1024.0) as usize
+}
+
+impl SearchPath {
+    /// Appends a state; nothing where it is the last one, and only a longer last move where it goes on in a straight line.
+    fn then_to(&mut self, state: SearchState, kind: SearchMove) {
+        let last = &self.states[self.states.len() - 1];
+        if *last == state {
+            return;
+        }
+        if self.moves.last() == Some(&kind) && self.continues(&state) {
+            let end = self.states.len() - 1;
+            self.states[end] = state;
+            return;
+        }
+        self.states.push(state);
+        self.moves.push(kind);
+    }
+
+    /// Whether the last move and the one to `state` are one straight line in joint space.
+    fn continues(&self, state: &SearchState) -> bool {
+        let [a, b] = [&self.states[self.states.len() - 2], &self.states[self.states.len() - 1]];
+        let vector = |p: &SearchState, q: &SearchState| {
+            let mut v = vec![q.pose.x - p.pose.x, q.pose.y - p.pose.y, q.pose.yaw - p.pose.yaw];
+            v.extend(q.joints.iter().zip(&p.joints).map(|(q, p)| q - p));
+            v
+        };
+        let (u, v) = (vector(a, b), vector(b, state));
+        let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let (nu, nv) = (norm(&u), norm(&v));
+        u.iter().zip(&v).all(|(u, v)| (u / nu - v / nv).abs() < 1e-9)
     }
 }

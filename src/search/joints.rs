@@ -1,0 +1,147 @@
+//! The joint path along a route, by dynamic programming over its pieces: least change, changes where there is time for
+//! them, and away from postures that are not free.
+
+use super::posture::{Bits, Neighbours};
+
+/// A posture change within the time that the base's piece takes anyway costs this per step ...
+const STEP: u32 = 2;
+/// ... and beyond it this: the base must wait.
+const WAIT: u32 = 20;
+/// Being one, two, three steps from a posture that is not free costs this a piece: room for the optimiser.
+const CLOSE: [u32; 3] = [12, 6, 3];
+
+const UNREACHED: u32 = u32::MAX / 2;
+
+/// One posture before each piece and one after the last, so `masks.len() + 1`; `None` where none gets through.
+///
+/// `masks`: free postures of each piece; a change during a piece passes only through its free postures. `rates`: steps that
+/// there is time for in each piece.
+pub(super) fn choose<const W: usize>(
+    neighbours: &Neighbours<W>,
+    count: usize,
+    masks: &[Bits<W>],
+    rates: &[usize],
+    start: Bits<W>,
+    goal: Bits<W>,
+) -> Option<Vec<usize>> {
+    let mut cost: Vec<u32> = (0..count).map(|p| if start.contains(p) { 0 } else { UNREACHED }).collect();
+    let mut came_from: Vec<Vec<u32>> = Vec::with_capacity(masks.len());
+    for (mask, rate) in masks.iter().zip(rates) {
+        let mut from: Vec<u32> = (0..count as u32).collect();
+        for (p, cost) in cost.iter_mut().enumerate() {
+            if !mask.contains(p) {
+                *cost = UNREACHED;
+            }
+        }
+        for _ in 0..*rate {
+            if !relax(neighbours, *mask, STEP, &mut cost, &mut from) {
+                break;
+            }
+        }
+        while relax(neighbours, *mask, WAIT, &mut cost, &mut from) {}
+        let mut near = *mask;
+        for close in CLOSE {
+            // Postures that have a neighbour outside: not in the mask's interior.
+            let outside = Bits::all(count).minus(near);
+            let edge = neighbours.dilate(outside, near);
+            edge.iter().for_each(|p| cost[p] = cost[p].saturating_add(close));
+            near = near.minus(edge);
+        }
+        came_from.push(from);
+    }
+    let last = goal.iter().filter(|p| cost[*p] < UNREACHED).min_by_key(|p| cost[*p])?;
+    let mut path = vec![last];
+    let mut at = last;
+    for from in came_from.iter().rev() {
+        at = from[at] as usize;
+        path.push(at);
+    }
+    path.reverse();
+    Some(path)
+}
+
+/// One step in every direction at once; whether anything got cheaper.
+fn relax<const W: usize>(
+    neighbours: &Neighbours<W>,
+    mask: Bits<W>,
+    step: u32,
+    cost: &mut [u32],
+    from: &mut [u32],
+) -> bool {
+    let before = cost.to_vec();
+    let origin = from.to_vec();
+    let mut changed = false;
+    for p in mask.iter() {
+        for q in neighbours.of(p) {
+            if before[q] < UNREACHED && before[q] + step < cost[p] {
+                cost[p] = before[q] + step;
+                from[p] = origin[q];
+                changed = true;
+            }
+        }
+    }
+    changed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(range: std::ops::Range<usize>) -> Bits<1> {
+        let mut bits = Bits::EMPTY;
+        range.for_each(|p| bits.insert(p));
+        bits
+    }
+
+    fn one_joint() -> Neighbours<1> {
+        use crate::robot::{MotionLimits, MovingJoint, RobotModel};
+        let joint = MovingJoint {
+            name: "j".into(),
+            prismatic: false,
+            lower: 0.0,
+            upper: 1.0,
+            limits: MotionLimits { speed: Some(1.0), acceleration: None, jerk: None },
+        };
+        let base = crate::robot::BaseLimits {
+            speed: 1.0,
+            acceleration: 1.0,
+            angular_speed: 1.0,
+            angular_acceleration: 1.0,
+            eta: 1.0,
+            min_speed: 0.01,
+        };
+        let robot = RobotModel {
+            name: "r".into(),
+            wheel_radius: 0.1,
+            track_width: 0.3,
+            root_link: "base".into(),
+            base_from_root: nalgebra::Isometry3::identity(),
+            joints: vec![joint],
+            bodies: vec![],
+            shapes: vec![],
+            wheel: MotionLimits { speed: None, acceleration: None, jerk: None },
+            base,
+            ignore_pairs: vec![],
+        };
+        Neighbours::new(&super::super::posture::PostureGrid::new(&robot, &[0.0]))
+    }
+
+    #[test]
+    fn a_change_is_spread_over_the_pieces_that_have_time_for_it() {
+        let masks = [line(0..64), line(0..64), line(0..64), line(30..64)];
+        let path = choose(&one_joint(), 64, &masks, &[12; 4], line(0..1), line(0..64)).expect("a way");
+        assert_eq!(path.len(), 5);
+        for (k, pair) in path.windows(2).enumerate() {
+            assert!(pair[0].abs_diff(pair[1]) <= 12, "piece {k}: {path:?}");
+        }
+        assert!(path[3] >= 30 && path[4] >= 30, "{path:?}");
+    }
+
+    #[test]
+    fn a_gap_in_the_free_postures_is_not_jumped() {
+        let mut split = line(0..20);
+        split = split.or(line(30..64));
+        assert!(choose(&one_joint(), 64, &[split], &[64], line(0..1), line(40..41)).is_none());
+        assert!(choose(&one_joint(), 64, &[split, line(0..64)], &[64, 64], line(0..1), line(40..41)).is_some());
+    }
+}

@@ -1,0 +1,198 @@
+//! Fewer corners: straight drives that skip corners of a route, where the postures still get through.
+
+use super::astar::TURN_COST;
+use super::collide::{BaseMotion, Collider};
+use super::posture::Bits;
+use super::route::{Route, drive_pieces, spin_pieces};
+use crate::geom::{Pose2, wrap_angle};
+
+/// A route with the free postures of each of its motions.
+pub(super) struct CheckedRoute<const W: usize> {
+    pub route: Route,
+    /// Per corner: free postures of the pieces of its turn.
+    turns: Vec<Vec<Bits<W>>>,
+    /// Per drive.
+    drives: Vec<Vec<Bits<W>>>,
+}
+
+pub(super) struct Shortcutter<'a, const W: usize> {
+    pub collider: &'a Collider<'a, W>,
+    pub start_postures: Bits<W>,
+    pub goal_postures: Bits<W>,
+    /// Whether the last turn may change: the goal leaves the heading open.
+    pub open_end: bool,
+}
+
+impl<const W: usize> CheckedRoute<W> {
+    /// Free postures of all pieces, in the order of [`Route::pieces`].
+    pub fn masks(&self) -> Vec<Bits<W>> {
+        let mut out = Vec::new();
+        for k in 0..self.turns.len() {
+            out.extend(&self.turns[k]);
+            if let Some(drive) = self.drives.get(k) {
+                out.extend(drive);
+            }
+        }
+        out
+    }
+}
+
+impl<const W: usize> Shortcutter<'_, W> {
+    /// Checks all pieces of a route. `None` where the postures do not get through.
+    pub fn check(&self, route: Route) -> Option<CheckedRoute<W>> {
+        let headings = headings_at_corners(&route);
+        let mut checked = CheckedRoute { turns: Vec::new(), drives: Vec::new(), route };
+        for (k, heading) in headings.iter().enumerate() {
+            let turn = self.turn(checked.route.corners[k], *heading, checked.route.turns[k])?;
+            checked.turns.push(turn);
+            if k + 1 < headings.len() {
+                let drive = self.drive(
+                    checked.route.corners[k],
+                    checked.route.corners[k + 1],
+                    heading + checked.route.turns[k],
+                )?;
+                checked.drives.push(drive);
+            }
+        }
+        let forward = self.reached(&checked);
+        (!forward[forward.len() - 1].and(self.goal_postures).is_empty()).then_some(checked)
+    }
+
+    fn turn(&self, at: [f64; 2], yaw: f64, turn: f64) -> Option<Vec<Bits<W>>> {
+        let mut pieces = Vec::new();
+        spin_pieces(Pose2::new(at[0], at[1], yaw), turn, &mut pieces);
+        self.masks_of(&pieces)
+    }
+
+    fn drive(&self, from: [f64; 2], to: [f64; 2], yaw: f64) -> Option<Vec<Bits<W>>> {
+        let mut pieces = Vec::new();
+        drive_pieces(Pose2::new(from[0], from[1], yaw), Pose2::new(to[0], to[1], yaw), &mut pieces);
+        self.masks_of(&pieces)
+    }
+
+    fn masks_of(&self, pieces: &[BaseMotion]) -> Option<Vec<Bits<W>>> {
+        pieces.iter().map(|p| Some(self.collider.free(p)).filter(|m| !m.is_empty())).collect()
+    }
+
+    fn flow(&self, set: Bits<W>, masks: &[Bits<W>]) -> Bits<W> {
+        masks.iter().fold(set, |set, mask| self.collider.neighbours.flood(set, *mask))
+    }
+
+    /// Postures that reach each corner (before its turn); last: after the last turn.
+    fn reached(&self, checked: &CheckedRoute<W>) -> Vec<Bits<W>> {
+        let mut set = self.start_postures;
+        let mut out = Vec::with_capacity(checked.turns.len() + 1);
+        for k in 0..checked.turns.len() {
+            out.push(set);
+            set = self.flow(set, &checked.turns[k]);
+            if let Some(drive) = checked.drives.get(k) {
+                set = self.flow(set, drive);
+            }
+        }
+        out.push(set);
+        out
+    }
+
+    /// Postures that get from each corner (after its turn) to the goal. Motions within a piece's free postures can be
+    /// undone, so this is the same flow backwards.
+    fn needed(&self, checked: &CheckedRoute<W>) -> Vec<Bits<W>> {
+        let mut set = self.goal_postures;
+        let mut out = vec![set; checked.turns.len()];
+        for k in (0..checked.turns.len()).rev() {
+            if let Some(drive) = checked.drives.get(k) {
+                set = drive.iter().rev().fold(set, |set, mask| self.collider.neighbours.flood(set, *mask));
+            }
+            out[k] = set;
+            set = checked.turns[k].iter().rev().fold(set, |set, mask| self.collider.neighbours.flood(set, *mask));
+        }
+        out
+    }
+
+    /// Replaces parts by straight drives while that makes the route cheaper.
+    pub fn shorten(&self, mut checked: CheckedRoute<W>) -> CheckedRoute<W> {
+        let mut from = 0;
+        while from + 2 < checked.route.corners.len() {
+            let (forward, backward) = (self.reached(&checked), self.needed(&checked));
+            let headings = headings_at_corners(&checked.route);
+            let last = checked.route.corners.len() - 1;
+            let found =
+                (from + 2..=last).rev().find_map(|to| self.skip(&checked, &headings, &forward, &backward, from, to));
+            match found {
+                Some(better) => {
+                    checked = better;
+                    // The corner before may now see farther.
+                    from = from.saturating_sub(1);
+                }
+                None => from += 1,
+            }
+        }
+        checked
+    }
+
+    /// The route with a straight drive from corner `a` to corner `b`, if it is cheaper and passable.
+    fn skip(
+        &self,
+        checked: &CheckedRoute<W>,
+        headings: &[f64],
+        forward: &[Bits<W>],
+        backward: &[Bits<W>],
+        a: usize,
+        b: usize,
+    ) -> Option<CheckedRoute<W>> {
+        let route = &checked.route;
+        if route.reverse[a..b].iter().any(|r| *r != route.reverse[a]) {
+            return None;
+        }
+        let (from, to) = (route.corners[a], route.corners[b]);
+        let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
+        let length = dx.hypot(dy);
+        if length < 1e-6 {
+            return None;
+        }
+        let yaw = dy.atan2(dx) + if route.reverse[a] { std::f64::consts::PI } else { 0.0 };
+        let turn_a = wrap_angle(yaw - headings[a]);
+        let at_end = b + 1 == route.corners.len();
+        let turn_b =
+            if at_end && self.open_end { 0.0 } else { wrap_angle(headings[b] + route.turns[b] - headings[a] - turn_a) };
+        let old: f64 = (a..b).map(|k| route.cost_of_drive(k)).sum::<f64>()
+            + TURN_COST * route.turns[a..=b].iter().map(|t| t.abs()).sum::<f64>();
+        if length + TURN_COST * (turn_a.abs() + turn_b.abs()) >= old - 1e-9 {
+            return None;
+        }
+        let first = self.turn(from, headings[a], turn_a)?;
+        let drive = self.drive(from, to, headings[a] + turn_a)?;
+        let second = self.turn(to, headings[a] + turn_a, turn_b)?;
+        let set = self.flow(self.flow(self.flow(forward[a], &first), &drive), &second);
+        if set.and(backward[b]).is_empty() {
+            return None;
+        }
+        let splice = |list: &Vec<Vec<Bits<W>>>, at: std::ops::Range<usize>, new: Vec<Vec<Bits<W>>>| {
+            let mut out = list.clone();
+            out.splice(at, new);
+            out
+        };
+        let mut shorter = route.clone();
+        shorter.corners.drain(a + 1..b);
+        shorter.turns.splice(a..=b, [turn_a, turn_b]);
+        shorter.reverse.drain(a + 1..b);
+        Some(CheckedRoute {
+            route: shorter,
+            turns: splice(&checked.turns, a..b + 1, vec![first, second]),
+            drives: splice(&checked.drives, a..b, vec![drive]),
+        })
+    }
+}
+
+/// Heading on arrival at each corner, before its turn; not wrapped.
+fn headings_at_corners(route: &Route) -> Vec<f64> {
+    let mut yaw = route.start_yaw;
+    route
+        .turns
+        .iter()
+        .map(|turn| {
+            let arrival = yaw;
+            yaw += turn;
+            arrival
+        })
+        .collect()
+}
