@@ -6,6 +6,7 @@
 
 mod astar;
 mod collide;
+mod drive;
 mod heuristic;
 mod joints;
 mod lattice;
@@ -449,5 +450,106 @@ impl SearchPath {
         let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
         let (nu, nv) = (norm(&u), norm(&v));
         u.iter().zip(&v).all(|(u, v)| (u / nu - v / nv).abs() < 1e-9)
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::robot::{BaseLimits, Body, BodyMotion, Convex, MotionLimits, MovingJoint, Shape};
+    use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
+
+    /// The reference robot SCR-DB, built by hand.
+    pub(crate) fn scr_db() -> RobotModel {
+        let some = |v| MotionLimits { speed: Some(v), acceleration: Some(2.0 * v), jerk: Some(10.0 * v) };
+        let at = |x, y, z| Isometry3::translation(x, y, z);
+        let blade = |side: f64| Body {
+            link: format!("blade {side}"),
+            parent: 0,
+            origin: at(0.0, 0.10 * side, 0.27),
+            motion: Some(BodyMotion {
+                joint: 0,
+                multiplier: side,
+                offset: 0.0,
+                axis: Unit::new_normalize(Vector3::new(0.0, -side, -1.0)),
+                prismatic: false,
+            }),
+        };
+        let shape = |link: &str, body, pose, convex| Shape { link: link.into(), body, pose, convex };
+        let lying = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
+        let wheel = |y| Isometry3::from_parts(Translation3::new(0.0, y, 0.08), lying);
+        let cylinder = || Convex::Cylinder { radius: 0.08, half_length: 0.015 };
+        RobotModel {
+            name: "scr_db".into(),
+            wheel_radius: 0.08,
+            track_width: 0.32,
+            root_link: "base_link".into(),
+            base_from_root: Isometry3::identity(),
+            joints: vec![MovingJoint {
+                name: "blade".into(),
+                prismatic: false,
+                lower: 0.0,
+                upper: std::f64::consts::PI,
+                limits: some(1.0),
+            }],
+            bodies: vec![
+                Body { link: "base_link".into(), parent: 0, origin: Isometry3::identity(), motion: None },
+                blade(1.0),
+                blade(-1.0),
+            ],
+            shapes: vec![
+                shape("base_link", 0, at(-0.09, 0.0, 0.14), Convex::Box { half: [0.21, 0.18, 0.11] }),
+                shape("base_link", 0, at(-0.25, 0.0, 0.015), Convex::Sphere { radius: 0.015 }),
+                shape("left_wheel", 0, wheel(0.16), cylinder()),
+                shape("right_wheel", 0, wheel(-0.16), cylinder()),
+                shape("left_blade", 1, at(0.0, 0.0, 0.18), Convex::Box { half: [0.05, 0.01, 0.18] }),
+                shape("right_blade", 2, at(0.0, 0.0, 0.18), Convex::Box { half: [0.05, 0.01, 0.18] }),
+            ],
+            wheel: MotionLimits { speed: Some(0.5), acceleration: Some(0.5), jerk: Some(2.0) },
+            base: BaseLimits {
+                speed: 0.5,
+                acceleration: 0.5,
+                angular_speed: 0.3125,
+                angular_acceleration: 1.5,
+                eta: 0.1,
+                min_speed: 0.01,
+            },
+            ignore_pairs: vec![],
+        }
+    }
+
+    #[test]
+    #[ignore]
+    fn scratch_scenes() {
+        let text = std::fs::read_to_string("/tmp/t1.txt").unwrap();
+        let mut lines = text.lines();
+        let robot = scr_db();
+        let mut all = Vec::new();
+        while let Some(head) = lines.next() {
+            let w: Vec<&str> = head.split(' ').collect();
+            let f = |k: usize| w[k].parse::<f64>().unwrap();
+            let mut map = VoxelMap::new(0.05, [0.0; 3], [200, 200, 20], crate::mission::Unknown::Occupied);
+            for _ in 0..w[8].parse::<usize>().unwrap() {
+                let b: Vec<f64> = lines.next().unwrap().split(' ').map(|v| v.parse().unwrap()).collect();
+                let r = |v: f64| (v / 0.05).round() as usize;
+                for i in r(b[0])..r(b[3]) { for j in r(b[1])..r(b[4]) { for k in r(b[2])..r(b[5]).min(20) { map.occupy([i, j, k]); } } }
+            }
+            let t0 = std::time::Instant::now();
+            let esdf = crate::esdf::build(&map);
+            let t1 = std::time::Instant::now();
+            let query = Query {
+                start: Pose2::new(f(2), f(3), f(4)), start_joints: vec![None],
+                goal: Pose2::new(f(5), f(6), f(7)), goal_yaw: Some(f(7)), goal_joints: vec![None],
+            };
+            let found = search(&map, &esdf, &robot, &query, &SearchOptions { clearance: 0.02, reverse: false });
+            let ms = t1.elapsed().as_secs_f64() * 1e3;
+            all.push(ms);
+            match found {
+                Ok(p) => println!("{} esdf {:.1} search {:.1} ms expanded {} length {:.2} straight {:.2} moves {}", w[1], (t1 - t0).as_secs_f64() * 1e3, ms, p.expanded, p.length(), query.start.distance(query.goal), p.moves.len()),
+                Err(e) => println!("{} {:.1} ms {e}", w[1], ms),
+            }
+        }
+        all.sort_by(f64::total_cmp);
+        println!("median {:.1} p90 {:.1} max {:.1}", all[all.len() / 2], all[all.len() * 9 / 10], all[all.len() - 1]);
     }
 }
