@@ -1,6 +1,9 @@
 //! Diagnostics: what is wrong, where, and what to do. `render` is the only code that formats one.
 
+pub mod json_schema;
 mod render;
+pub mod shape;
+pub mod yaml;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -8,7 +11,7 @@ use std::sync::Arc;
 pub use render::render;
 
 /// A text that a person wrote, kept for quoting.
-#[derive(Debug, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub struct Source {
     /// Path as the user knows it.
     pub name: String,
@@ -146,14 +149,22 @@ impl<E: Describe> From<Vec<E>> for Diagnostics {
     }
 }
 
-/// The known name nearest to a wrong one, if it is near enough to be meant.
+/// The known name nearest to a wrong one, if it is near enough to be meant: few letters differ (case apart), or one is the
+/// other with a unit (`yaw_deg`, `clearance`).
 pub fn nearest<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let lower = wrong.to_lowercase();
+    let unit_apart = |long: &str, short: &str| long.strip_prefix(short).is_some_and(|rest| rest.starts_with('_'));
     known
         .into_iter()
-        .map(|name| (edit_distance(wrong, name), name))
-        .filter(|(d, name)| *d <= 1 + name.len().max(wrong.len()) / 3)
-        .min_by_key(|(d, _)| *d)
-        .map(|(_, name)| name)
+        .map(|name| {
+            let distance = edit_distance(&lower, &name.to_lowercase());
+            let meant =
+                distance <= 1 + name.len().max(wrong.len()) / 3 || unit_apart(&lower, name) || unit_apart(name, &lower);
+            (meant, distance, name)
+        })
+        .filter(|(meant, _, _)| *meant && !wrong.is_empty())
+        .min_by_key(|(_, distance, _)| *distance)
+        .map(|(_, _, name)| name)
 }
 
 fn edit_distance(a: &str, b: &str) -> usize {
