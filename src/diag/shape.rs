@@ -124,15 +124,15 @@ impl Bounds {
     }
 }
 
-/// Checks a tree against a table of keys; all faults, in the order of the text. `what` names the file's kind: `a mission`.
-pub fn check(source: &Arc<Source>, root: &Node, table: &'static [Field], what: &str) -> Vec<Diagnostic> {
+/// Checks a tree against a table of keys and returns all faults. `what` names the file's kind (`a mission`), `outline` says
+/// what it must hold at least.
+pub fn check(source: &Arc<Source>, root: &Node, table: &'static [Field], what: &str, outline: &str) -> Vec<Diagnostic> {
     let mut checker = Checker { source, root: table, what, faults: Vec::new() };
     let start = root.range.start..root.range.start;
     match &root.value {
         Value::Map(_) => checker.table(root, table, "", &start),
         Value::Null => {
-            let needed: Vec<String> = needed(table).map(|f| format!("`{}: {}`", f.key, f.example)).collect();
-            let hint = format!("{what} begins with {}", needed.join(", "));
+            let hint = format!("{what} needs at least {outline}");
             checker.fault("yaml/empty", "the file is empty".to_string(), &start, hint);
         }
         _ => {
@@ -148,8 +148,13 @@ pub fn check(source: &Arc<Source>, root: &Node, table: &'static [Field], what: &
     checker.faults
 }
 
-fn needed(table: &'static [Field]) -> impl Iterator<Item = &'static Field> {
-    table.iter().filter(|f| f.required)
+/// Whether a table has a key, or an unknown key that was meant to be it (which is a fault of its own).
+pub fn nearly_has(node: &Node, table: &[Field], key: &str) -> bool {
+    node.entries().iter().any(|e| {
+        let known = table.iter().any(|f| f.key == e.key);
+        let before_colon = e.key.split_once(':').map(|(before, _)| before);
+        e.key == key || !known && (before_colon == Some(key) || nearest(&e.key, [key]).is_some())
+    })
 }
 
 struct Checker<'a> {
@@ -173,8 +178,8 @@ impl Checker<'_> {
                 None => self.unknown(node, entry, table, path),
             }
         }
-        for field in needed(table) {
-            if node.entries().iter().all(|e| e.key != field.key) {
+        for field in table.iter().filter(|f| f.required) {
+            if !nearly_has(node, table, field.key) {
                 let owner = if path.is_empty() { self.what.to_string() } else { format!("`{path}`") };
                 let message = format!("{owner} needs `{}`, which is missing", field.key);
                 let hint = format!("add `{}: {}` ({})", field.key, field.example, field.doc);
@@ -275,7 +280,12 @@ impl Checker<'_> {
 
     fn wrong(&mut self, node: &Node, field: &'static Field, shape: &'static Shape, path: &str) {
         let message = format!("`{path}` must be {}, found {}", words(shape), found(node, self.source));
-        let spelling = node.text().and_then(|text| spelling(text, shape));
+        let spelling = match (&node.value, shape) {
+            (Value::Number(_) | Value::Flag(_), Shape::Text | Shape::TextOrList) => {
+                Some(format!("put it in quotes: `\"{}\"`", written(node, self.source)))
+            }
+            _ => node.text().and_then(|text| spelling(text, shape)),
+        };
         self.fault("yaml/wrong-type", message, &node.range, spelling.unwrap_or_else(|| example(field)));
     }
 
@@ -308,8 +318,13 @@ impl Checker<'_> {
         {
             return format!("a space is missing after the colon: `{before}: {after}`");
         }
-        if key.bytes().all(|b| b.is_ascii_digit()) && !key.is_empty() && entry.value.value == Value::Null {
-            return format!("is this a decimal comma? write a point: `0.{key}`");
+        let before = node.entries().windows(2).find(|pair| std::ptr::eq(&pair[1], entry)).map(|pair| &pair[0]);
+        if let Some(before) = before
+            && key.bytes().all(|b| b.is_ascii_digit())
+            && matches!((&before.value.value, &entry.value.value), (Value::Number(_), Value::Null))
+        {
+            let whole = written(&before.value, self.source);
+            return format!("decimals are written with a point: `{}: {whole}.{key}`", before.key);
         }
         let free = table.iter().map(|f| f.key).filter(|k| node.entries().iter().all(|e| e.key != *k));
         let near = nearest(key, free);
@@ -322,6 +337,9 @@ impl Checker<'_> {
             (Some(near), false) => format!("did you mean `{near}`? ({belongs})"),
             (None, false) => belongs,
             (None, true) => {
+                if let Some(given) = nearest(key, table.iter().map(|f| f.key)) {
+                    return format!("did you mean `{given}`, which is given already?");
+                }
                 let keys: Vec<String> = table.iter().map(|f| format!("`{}`", f.key)).collect();
                 format!("known keys are {}", keys.join(", "))
             }
@@ -376,7 +394,11 @@ fn words(shape: &Shape) -> String {
 }
 
 fn range_words(bounds: &Bounds, value: f64) -> String {
-    let unit = if bounds.unit.is_empty() { String::new() } else { format!(" ({})", bounds.unit) };
+    let unit = match bounds.unit {
+        "" => String::new(),
+        either if either.contains(' ') => format!(" ({either})"),
+        unit => format!(" {unit}"),
+    };
     let Bounds { least, most, .. } = bounds;
     match (bounds.open, *most >= LARGE && value <= *most) {
         (true, true) => format!("greater than {least}{unit}"),
@@ -456,6 +478,9 @@ fn spelling(text: &str, shape: &Shape) -> Option<String> {
     }
     if let Some(number) = plain_number(&text.replacen(',', ".", 1)) {
         return Some(format!("decimals are written with a point: `{number}`"));
+    }
+    if angle && text.contains("pi") {
+        return Some("nothing is computed here: write the number, or degrees such as `90deg`".into());
     }
     let digits = text.trim_end_matches(|c: char| !c.is_ascii_digit() && c != '.');
     let unit = text[digits.len()..].trim();

@@ -332,8 +332,8 @@ fn explain(error: &Error, source: &Arc<Source>) -> Diagnostic {
         other => {
             let message = UserMessageFormatter.format_message(other);
             Diagnostic::error("yaml/syntax", format!("not valid YAML: {message}"))
-                .hint(if message.contains("mapping values") {
-                    "a colon here makes no key: look for wrong indentation, or a colon without a space after it in the line before"
+                .hint(if ["mapping values", "simple key expected"].iter().any(|m| message.contains(m)) {
+                    "a key is written `key: value`, with a colon and a space: look for one without, or for wrong indentation"
                 } else {
                     "look at this line and the one before it: indentation (spaces, no tabs), brackets, quotes, `key: value`"
                 })

@@ -114,7 +114,7 @@ static MAP: [Field; 5] = [
     ),
 ];
 
-static POSE: [Field; 4] = [
+pub(super) static POSE: [Field; 4] = [
     Field::optional("x_m", METRES, "0.5", "metres, map frame"),
     Field::optional("y_m", METRES, "0.5", "metres, map frame"),
     Field::optional(
@@ -162,7 +162,7 @@ static PATH_ERROR: [Field; 1] = [Field::required(
 static POINT: Shape = Shape::List { item: &METRES, count: (2, 2), form: "a point [x, y] in metres: 2 numbers" };
 static SEGMENT: Shape = Shape::List { item: &POINT, count: (4, 4), form: "a cubic segment of 4 control points [x, y]" };
 
-static PATH: [Field; 2] = [
+pub(super) static PATH: [Field; 2] = [
     Field::optional(
         "bezier",
         Shape::List { item: &SEGMENT, count: (1, usize::MAX), form: "a list of cubic segments, at least one" },

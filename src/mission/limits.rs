@@ -153,6 +153,8 @@ pub(crate) fn check(source: &Arc<Source>, limits: Option<&Node>) -> Vec<Diagnost
         let (lower, upper) = (joint.value.get("lower")?, joint.value.get("upper")?);
         let (low, high) = (lower.angle()?, upper.angle()?);
         (low >= high).then(|| {
+            let written = |node: &Node| source.text[node.range.clone()].trim().to_string();
+            let (low, high) = (written(lower), written(upper));
             let message = format!("`limits.joints.{}`: lower ({low}) is not below upper ({high})", joint.key);
             Diagnostic::error("yaml/limits-crossed", message)
                 .at(&Span::new(source, lower.range.clone()))

@@ -3,11 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::fields::{MISSION, SAMPLING_LAWS, TIME_LAWS};
+use super::fields::{MISSION, PATH, POSE, SAMPLING_LAWS, TIME_LAWS};
 use super::{MapSpec, Mission, MissionSpans, NamedJoint, PathSpec, PoseSpec, Sampling, TimeLaw, Unknown, limits};
+use crate::diag::shape::Field;
 use crate::diag::yaml::{Entry, Node};
 use crate::diag::{Diagnostic, Diagnostics, Source, Span, shape, yaml};
 
+/// What a mission must hold at least, for the message about an empty one.
+const OUTLINE: &str = "`robot`, and either `map`, `start` and `goal`, or a given `path`";
 /// Consecutive Bezier segments join within this distance, metres.
 const JOIN_TOLERANCE: f64 = 1e-6;
 
@@ -15,7 +18,7 @@ const JOIN_TOLERANCE: f64 = 1e-6;
 pub(super) fn parse(name: &str, text: &str) -> Result<Mission, Diagnostics> {
     let source = Arc::new(Source { name: name.to_string(), text: text.to_string() });
     let root = yaml::load(&source)?;
-    let mut faults = shape::check(&source, &root, &MISSION, "a mission");
+    let mut faults = shape::check(&source, &root, &MISSION, "a mission", OUTLINE);
     if !root.entries().is_empty() {
         faults.extend(Between { source: &source, root: &root }.check());
     }
@@ -150,7 +153,7 @@ struct Between<'a> {
 impl Between<'_> {
     fn check(&self) -> Vec<Diagnostic> {
         let mut faults = limits::check(self.source, self.root.get("limits"));
-        if self.has(self.root, "path") {
+        if self.has(self.root, &MISSION, "path") {
             self.given_path(&mut faults);
         } else {
             self.search(&mut faults);
@@ -167,8 +170,8 @@ impl Between<'_> {
     }
 
     /// Whether a key is there, well formed or not.
-    fn has(&self, node: &Node, key: &str) -> bool {
-        node.entries().iter().any(|e| e.key == key)
+    fn has(&self, node: &Node, table: &[Field], key: &str) -> bool {
+        shape::nearly_has(node, table, key)
     }
 
     fn at(&self, code: &'static str, message: String, node: &Node) -> Diagnostic {
@@ -178,7 +181,8 @@ impl Between<'_> {
     /// Without a given path: map, start and goal, each with a position; a heading to start with.
     fn search(&self, faults: &mut Vec<Diagnostic>) {
         let top = Span::new(self.source, self.root.range.start..self.root.range.start);
-        let missing: Vec<&str> = ["map", "start", "goal"].into_iter().filter(|k| !self.has(self.root, k)).collect();
+        let missing: Vec<&str> =
+            ["map", "start", "goal"].into_iter().filter(|k| !self.has(self.root, &MISSION, k)).collect();
         if missing.len() == 3 {
             let message = "a mission needs either `map`, `start` and `goal`, or a given `path`; it has none of them";
             let hint = "for example `map: {file: ../maps/arch_bridges.pcd}`, `start: {x_m: 0.5, y_m: 0.5, yaw: 0deg}`, \
@@ -197,9 +201,10 @@ impl Between<'_> {
             // Not a map at all: already said.
             let empty = matches!(&pose.value.value, yaml::Value::Map(_));
             let missing: Vec<String> =
-                parts.iter().filter(|p| empty && !self.has(&pose.value, p)).map(|p| format!("`{p}`")).collect();
+                parts.iter().filter(|p| empty && !self.has(&pose.value, &POSE, p)).map(|p| format!("`{p}`")).collect();
             if !missing.is_empty() {
-                let message = format!("`{key}` needs {}, which is missing", missing.join(" and "));
+                let are = if missing.len() == 1 { "is" } else { "are" };
+                let message = format!("`{key}` needs {}, which {are} missing", one_and_one(&missing));
                 let hint = match key {
                     "start" => "where the robot stands is known: `start: {x_m: 0.5, y_m: 0.5, yaw: 0deg}`",
                     _ => "for example `goal: {x_m: 9.0, y_m: 8.0}`; its yaw may be left out",
@@ -214,7 +219,7 @@ impl Between<'_> {
         let Some(path) = self.root.entry("path") else { return };
         let yaml::Value::Map(_) = path.value.value else { return };
         let key = Span::new(self.source, path.key_range.clone());
-        match (self.has(&path.value, "bezier"), self.has(&path.value, "file")) {
+        match (self.has(&path.value, &PATH, "bezier"), self.has(&path.value, &PATH, "file")) {
             (true, true) => faults.push(
                 Diagnostic::error("mission/two-paths", "`path` has both `bezier` and `file`")
                     .at(&key)
@@ -255,6 +260,13 @@ impl Between<'_> {
             }
             last_end = Some(points[3]);
         }
+    }
+}
+
+fn one_and_one(words: &[String]) -> String {
+    match words {
+        [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
+        _ => words.concat(),
     }
 }
 

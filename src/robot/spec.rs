@@ -138,19 +138,15 @@ static COLLISION: [Field; 2] = [
 pub fn parse(name: &str, text: &str) -> Result<RobotSpec, Diagnostics> {
     let source = Arc::new(Source { name: name.to_string(), text: text.to_string() });
     let root = yaml::load(&source)?;
-    let mut faults = shape::check(&source, &root, &ROBOT, "a robot.yaml");
+    let mut faults = shape::check(&source, &root, &ROBOT, "a robot.yaml", "`urdf: NAME.urdf`");
     let reader = Reader { source: &source, root: &root };
     let spec = reader.spec();
     faults.extend(limits::check(&source, root.get("limits")));
     faults.extend(reader.drive_sides(&spec));
     let wheels = spec.drive_left.iter().chain(&spec.drive_right);
-    faults.extend(reader.named_twice(wheels, "drive wheel", "a wheel has one joint and one side"));
+    faults.extend(reader.named_twice(wheels, "drive", "a wheel has one joint and one side"));
     let held = spec.moving.iter().flatten().chain(spec.fixed.iter().map(|(joint, _)| joint));
-    faults.extend(reader.named_twice(
-        held,
-        "joint under `joints`",
-        "a joint either moves or is fixed, and is named once",
-    ));
+    faults.extend(reader.named_twice(held, "joints", "a joint either moves or is fixed, and is named once"));
     if faults.is_empty() {
         return Ok(spec);
     }
@@ -239,7 +235,7 @@ impl Reader<'_> {
     fn named_twice<'b>(
         &self,
         names: impl Iterator<Item = &'b Written<String>>,
-        what: &str,
+        table: &str,
         hint: &str,
     ) -> Vec<Diagnostic> {
         let mut seen: Vec<&Written<String>> = names.collect();
@@ -247,7 +243,7 @@ impl Reader<'_> {
         let twice = seen.windows(2).filter(|pair| pair[0].value == pair[1].value);
         twice
             .map(|pair| {
-                let message = format!("{what} `{}` is named twice", pair[1].value);
+                let message = format!("`{}` is named twice under `{table}`", pair[1].value);
                 Diagnostic::error("robot/named-twice", message).maybe_at(pair[1].span.as_ref()).hint(hint)
             })
             .collect()
