@@ -161,8 +161,10 @@ pub fn nearest<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
         .into_iter()
         .map(|name| {
             let distance = edit_distance(&lower, &name.to_lowercase());
-            let meant =
-                distance <= 1 + name.len().max(wrong.len()) / 3 || unit_apart(&lower, name) || unit_apart(name, &lower);
+            let (short, long) = (name.len().min(wrong.len()), name.len().max(wrong.len()));
+            let meant = (distance <= long.div_ceil(3) && distance < short)
+                || unit_apart(&lower, name)
+                || unit_apart(name, &lower);
             (meant, distance, name)
         })
         .filter(|(meant, _, _)| *meant)

@@ -345,69 +345,128 @@ fn explain(error: &Error, source: &Arc<Source>) -> Diagnostic {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    fn source(text: &str) -> Arc<Source> {
+        Arc::new(Source { name: "t.yaml".into(), text: text.into() })
+    }
+
+    fn tree(text: &str) -> Node {
+        load(&source(text)).expect(text)
+    }
+
+    fn code(text: &str) -> &'static str {
+        load(&source(text)).expect_err(text).code
+    }
 
     #[test]
-    fn probe() {
-        for text in [
-            "",
-            "a: 1.5\nb: [1, {x: 'q', y: 90deg}, -2e-3]\nc: &k {a: .nan}\nd: *k\n",
-            "\u{feff}é: 1\r\nß: yes\r\n",
-            "a: 1\na: 2\n",
-            "~",
-            "- 0x10\n- 007\n- 1_000\n- !!str 5\n- true\n- !foo 5\n",
-            "- 0x10\n- 007\n- 1_000\n- !!str 5\n- true\n- 1e400\n- 1.\n- .5\n- 99999999999999999999999999999999999999999999999\n",
-            "a: {<<: *x}",
-            "base: &b {x: 1}\nc: {<<: *b, y: 2}\n",
-            "{x_m:0.5, y_m: 0,5}",
-            "a: [1, 2",
-            "a: b: c",
-            "\ta: 1",
-            "? [a]\n: 1\n",
-            ": 1\n",
-            "--- 1\n--- 2\n",
-            "a:0.5\nb: 1\n",
-            "x: |\n  abc\n  def\ny: 1\n",
-            "a: 1\n  b: 2\n",
-            "'a",
-            "a: @x",
-            "a: {b: 1}}",
-            "%x",
-            "a:\n- 1\n -2\n",
-        ] {
-            let source = Arc::new(Source { name: "t".into(), text: text.into() });
-            println!("=== {text:?}");
-            match load(&source) {
-                Ok(n) => show(&n, text, 0),
-                Err(d) => println!("{}", crate::diag::render(&d.into(), false)),
-            }
-        }
-        for text in [
-            "[".repeat(100),
-            format!(
-                "{}",
-                "a: &a [1,1,1,1,1,1,1,1,1,1]\nb: &b [*a,*a,*a,*a,*a,*a,*a,*a,*a]\nc: &c [*b,*b,*b,*b,*b,*b,*b,*b,*b]\nd: &d [*c,*c,*c,*c,*c,*c,*c,*c,*c]\ne: &e [*d,*d,*d,*d,*d,*d,*d,*d,*d]\nf: &f [*e,*e,*e,*e,*e,*e,*e,*e,*e]\n"
-            ),
-        ] {
-            let source = Arc::new(Source { name: "t".into(), text: text.into() });
-            println!("{}", crate::diag::render(&load(&source).unwrap_err().into(), false));
+    fn every_value_knows_where_it_is_written() {
+        let text = "a: 1.5\nb: [1, {x: 'q', y: 90deg}, -2e-3 ]\nc:\n  d: ~\n";
+        let root = tree(text);
+        let at = |node: &Node| text[node.range.clone()].to_string();
+        let b = root.get("b").expect("b");
+        assert_eq!(at(b), "[1, {x: 'q', y: 90deg}, -2e-3 ]");
+        assert_eq!(at(&b.items()[1]), "{x: 'q', y: 90deg}");
+        assert_eq!(at(b.items()[1].get("x").expect("x")), "'q'");
+        assert_eq!(b.items()[1].get("y").and_then(Node::angle), Some(90f64.to_radians()));
+        assert_eq!(b.items()[2].number(), Some(-2e-3));
+        let c = &root.entries()[2];
+        assert_eq!((c.key.as_str(), &text[c.key_range.clone()]), ("c", "c"));
+        assert_eq!(c.value.entries()[0].value.value, Value::Null);
+    }
+
+    #[test]
+    fn places_count_bytes_in_texts_with_a_byte_order_mark_wide_letters_and_carriage_returns() {
+        let text = "\u{feff}é: 1\r\nß: [ü, 2]\r\n";
+        let root = tree(text);
+        let second = &root.entries()[1];
+        assert_eq!(&text[second.key_range.clone()], "ß");
+        assert_eq!(&text[second.value.items()[1].range.clone()], "2");
+    }
+
+    #[test]
+    fn an_alias_points_at_what_it_stands_for() {
+        let text = "a: &here {x: 1}\nb: *here\nc: {<<: *here, y: 2}\n";
+        let root = tree(text);
+        assert_eq!(root.get("b"), root.get("a"));
+        let c = root.get("c").expect("c");
+        assert_eq!((c.get("x").and_then(Node::number), c.get("y").and_then(Node::number)), (Some(1.0), Some(2.0)));
+    }
+
+    #[test]
+    fn yes_and_no_are_text_and_numbers_are_what_yaml_says() {
+        let root = tree("[yes, true, 007, 0x10, '5', .inf, 1e400, 1., .5, 90deg]");
+        let values: Vec<&Value> = root.items().iter().map(|n| &n.value).collect();
+        let number = Value::Number;
+        let text = |t: &str| Value::Text(t.into());
+        let (inf, flag) = (f64::INFINITY, Value::Flag(true));
+        let want = [
+            text("yes"),
+            flag,
+            number(7.0),
+            number(16.0),
+            text("5"),
+            number(inf),
+            number(inf),
+            number(1.0),
+            number(0.5),
+            text("90deg"),
+        ];
+        assert_eq!(values, want.iter().collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn degrees_are_a_plain_number_and_deg() {
+        assert_eq!(degrees("-1.5e1deg"), Some(-15.0));
+        for wrong in ["deg", "infdeg", "nandeg", "90 deg", "90", "90degs", "ninetydeg"] {
+            assert_eq!(degrees(wrong), None, "{wrong}");
         }
     }
 
-    fn show(n: &Node, text: &str, depth: usize) {
-        let pad = " ".repeat(depth);
-        match &n.value {
-            Value::List(items) => {
-                println!("{pad}list {:?}", &text[n.range.clone()]);
-                items.iter().for_each(|i| show(i, text, depth + 2));
+    #[test]
+    fn deep_nesting_and_alias_bombs_end_in_a_fault() {
+        let nested = |n: usize| format!("{}{}", "[".repeat(n), "]".repeat(n));
+        assert!(load(&source(&nested(MAX_DEPTH - 1))).is_ok());
+        assert_eq!(code(&nested(MAX_DEPTH + 1)), "yaml/too-deep");
+        // So deep that the parser itself gives up first.
+        assert!(load(&source(&nested(100_000))).is_err());
+        let block: String = (0..100).map(|i| format!("{}a:\n", " ".repeat(i))).collect();
+        assert_eq!(code(&block), "yaml/too-deep");
+        let mut bomb = "a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1]\n".to_string();
+        for i in 1..20 {
+            bomb += &format!("a{i}: &a{i} [{}]\n", vec![format!("*a{}", i - 1); 9].join(", "));
+        }
+        assert_eq!(code(&bomb), "yaml/too-large");
+    }
+
+    #[test]
+    fn a_long_path_of_ten_thousand_segments_is_read() {
+        let segment = "[[0.1, 0.2], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]]";
+        let root = tree(&format!("[{}]", vec![segment; 10_000].join(",\n")));
+        assert_eq!(root.items().len(), 10_000);
+    }
+
+    fn within(node: &Node, text: &str) {
+        assert!(text.get(node.range.clone()).is_some(), "{:?} in {text:?}", node.range);
+        node.items().iter().for_each(|n| within(n, text));
+        for e in node.entries() {
+            assert!(text.get(e.key_range.clone()).is_some(), "{:?} in {text:?}", e.key_range);
+            within(&e.value, text);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_text_panics_and_all_places_lie_within_it(text in r"([a-cé&*!|>'\x22\[\]{}:,#?~<% \t\r\n\x{feff}0-9.-]|: |\n  |\n- ){0,60}") {
+            match load(&source(&text)) {
+                Ok(root) => within(&root, &text),
+                Err(fault) => prop_assert!(!crate::diag::render(&fault.into(), false).is_empty()),
             }
-            Value::Map(entries) => {
-                println!("{pad}map {:?}", &text[n.range.clone()]);
-                for e in entries {
-                    println!("{pad} key {:?} {:?}", e.key, &text[e.key_range.clone()]);
-                    show(&e.value, text, depth + 3);
-                }
-            }
-            v => println!("{pad}{v:?} {:?}", &text[n.range.clone()]),
+        }
+
+        #[test]
+        fn numbers_are_read_to_the_last_digit(number in proptest::num::f64::NORMAL) {
+            prop_assert_eq!(tree(&format!("[{number:?}]")).items()[0].number(), Some(number));
         }
     }
 }
