@@ -160,8 +160,9 @@ pub fn nearest<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
     known
         .into_iter()
         .map(|name| {
-            let distance = edit_distance(&lower, &name.to_lowercase());
             let (short, long) = (name.len().min(wrong.len()), name.len().max(wrong.len()));
+            let far = long - short > long.div_ceil(3);
+            let distance = if far { long } else { edit_distance(&lower, &name.to_lowercase()) };
             let meant = (distance <= long.div_ceil(3) && distance < short)
                 || unit_apart(&lower, name)
                 || unit_apart(name, &lower);

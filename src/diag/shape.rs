@@ -103,6 +103,9 @@ pub struct Bounds {
 /// Beyond this a length, angle or rate is a mistake, and sums of squares would no longer be safe.
 pub const LARGE: f64 = 1e6;
 
+/// No more faults than this are collected from one file: a file of noise must not take minutes to refuse.
+const MOST_FAULTS: usize = 200;
+
 impl Bounds {
     /// Any number of a sensible size.
     pub const fn any(unit: &'static str) -> Self {
@@ -169,10 +172,17 @@ impl Checker<'_> {
         self.faults.push(Diagnostic::error(code, message).at(&Span::new(self.source, at.clone())).hint(hint));
     }
 
+    fn full(&self) -> bool {
+        self.faults.len() >= MOST_FAULTS
+    }
+
     /// `at`: the key that the table is the value of.
     fn table(&mut self, node: &Node, table: &'static [Field], path: &str, at: &Range<usize>) {
         self.repeated(node, path);
         for entry in node.entries() {
+            if self.full() {
+                return;
+            }
             match table.iter().find(|f| f.key == entry.key) {
                 Some(field) => self.entry(entry, field, &field.shape, &join(path, &entry.key)),
                 None => self.unknown(node, entry, table, path),
@@ -234,6 +244,9 @@ impl Checker<'_> {
             Shape::Named(item) if matches!(node.value, Value::Map(_)) => {
                 self.repeated(node, path);
                 for entry in node.entries() {
+                    if self.full() {
+                        return;
+                    }
                     self.entry(entry, field, item, &join(path, &entry.key));
                 }
             }
@@ -243,6 +256,9 @@ impl Checker<'_> {
 
     fn items(&mut self, node: &Node, field: &'static Field, item: &'static Shape, path: &str) {
         for (i, child) in node.items().iter().enumerate() {
+            if self.full() {
+                return;
+            }
             self.value(child, field, item, &format!("{path}[{i}]"), &child.range);
         }
     }
@@ -295,7 +311,7 @@ impl Checker<'_> {
         order.sort_by_key(|&i| (&entries[i].key, i));
         for pair in order.windows(2) {
             let (first, again) = (&entries[pair[0]], &entries[pair[1]]);
-            if first.key == again.key {
+            if first.key == again.key && !self.full() {
                 let line = self.source.text[..first.key_range.start].bytes().filter(|b| *b == b'\n').count() + 1;
                 let message = format!("`{}` is given twice", join(path, &again.key));
                 let hint = format!("it is given before in line {line}: keep one of the two");

@@ -12,7 +12,7 @@ use serde_saphyr::budget::BudgetBreach;
 use serde_saphyr::options::{DuplicateKeyPolicy, NonFiniteFloatPolicy, Options};
 use serde_saphyr::{Error, Location, MessageFormatter, Spanned, UserMessageFormatter};
 
-use super::{Diagnostic, Source, Span};
+use super::{Diagnostic, Diagnostics, Source, Span};
 
 /// Deepest nesting of maps and lists. Our own files need six levels.
 pub const MAX_DEPTH: usize = 32;
@@ -131,11 +131,11 @@ pub(super) fn plain_number(text: &str) -> Option<f64> {
 ///
 /// # Errors
 /// Not YAML, more than one document, or beyond [`MAX_DEPTH`] or [`MAX_NODES`]: the one fault at which the parser stops.
-pub fn load(source: &Arc<Source>) -> Result<Node, Diagnostic> {
+pub fn load(source: &Arc<Source>) -> Result<Node, Diagnostics> {
     let text = source.text.as_str();
     match serde_saphyr::from_str_with_options::<Spanned<Raw>>(text, options()) {
         Ok(root) => Ok(node(root, text)),
-        Err(error) => Err(explain(&error, source)),
+        Err(error) => Err(explain(&error, source).into()),
     }
 }
 
@@ -356,7 +356,7 @@ mod tests {
     }
 
     fn code(text: &str) -> &'static str {
-        load(&source(text)).expect_err(text).code
+        load(&source(text)).expect_err(text).0[0].code
     }
 
     #[test]
@@ -460,7 +460,7 @@ mod tests {
         fn no_text_panics_and_all_places_lie_within_it(text in r"([a-cé&*!|>'\x22\[\]{}:,#?~<% \t\r\n\x{feff}0-9.-]|: |\n  |\n- ){0,60}") {
             match load(&source(&text)) {
                 Ok(root) => within(&root, &text),
-                Err(fault) => prop_assert!(!crate::diag::render(&fault.into(), false).is_empty()),
+                Err(faults) => prop_assert!(!crate::diag::render(&faults, false).is_empty()),
             }
         }
 

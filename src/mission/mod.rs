@@ -221,3 +221,6 @@ pub fn json_schema() -> serde_json::Value {
         &[("anyOf", serde_json::json!([planned, given]))],
     )
 }
+
+#[cfg(test)]
+mod tests;

@@ -249,3 +249,118 @@ impl Reader<'_> {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diag::render;
+    use proptest::prelude::*;
+
+    const FULL: &str = "\
+name: scr_db
+urdf: scr_db.urdf
+drive: {left: [front_left, rear_left], right: right_wheel_joint, wheel_radius_m: 0.08, track_width_m: 0.32}
+joints:
+  moving: [blade]
+  fixed: {arm_lift: 0.10, arm_turn: 90deg}
+limits:
+  wheel: {speed_mps: 0.5}
+  joints: {blade: {lower: 0deg, upper: 180deg, speed: 1.0, acceleration: 2.0, jerk: 10.0}}
+  base: {eta: 0.1}
+collision:
+  ignore_links: [lidar]
+  ignore_pairs: [[base_link, left_blade]]
+";
+
+    fn good(text: &str) -> RobotSpec {
+        parse("robots/r/robot.yaml", text).unwrap_or_else(|faults| panic!("{}", render(&faults, false)))
+    }
+
+    #[test]
+    fn every_key_is_read_with_its_place() {
+        let spec = good(FULL);
+        let names = |list: &[Written<String>]| list.iter().map(|w| w.value.clone()).collect::<Vec<_>>();
+        assert_eq!(spec.name.as_deref(), Some("scr_db"));
+        assert_eq!(spec.urdf.as_ref().map(|w| w.value.clone()), Some("scr_db.urdf".into()));
+        assert_eq!(names(&spec.drive_left), ["front_left", "rear_left"]);
+        assert_eq!(names(&spec.drive_right), ["right_wheel_joint"]);
+        assert_eq!(spec.wheel_radius.as_ref().map(|w| w.value), Some(0.08));
+        assert_eq!(spec.track_width.as_ref().map(|w| w.value), Some(0.32));
+        assert_eq!(names(spec.moving.as_ref().expect("moving")), ["blade"]);
+        let fixed: Vec<(&str, f64)> = spec.fixed.iter().map(|(w, value)| (w.value.as_str(), *value)).collect();
+        assert_eq!(fixed, [("arm_lift", 0.1), ("arm_turn", std::f64::consts::FRAC_PI_2)]);
+        assert_eq!(spec.limits.wheel.speed, Some(0.5));
+        assert_eq!(spec.limits.joints["blade"].upper, Some(std::f64::consts::PI));
+        assert_eq!(names(&spec.limit_joints), ["blade"]);
+        assert_eq!(names(&spec.ignore_links), ["lidar"]);
+        assert_eq!(names(&spec.ignore_pairs[0]), ["base_link", "left_blade"]);
+        for written in spec.drive_left.iter().chain(&spec.limit_joints).chain(spec.ignore_pairs.iter().flatten()) {
+            let span = written.span.as_ref().expect("a span");
+            assert_eq!(span.source.text[span.range.clone()], written.value);
+        }
+    }
+
+    #[test]
+    fn only_the_urdf_must_be_given() {
+        let spec = good("urdf: a.urdf\n");
+        assert_eq!(spec, RobotSpec { urdf: spec.urdf.clone(), ..RobotSpec::default() });
+        assert_eq!(good("urdf: a.urdf\njoints: {moving: []}\n").moving, Some(Vec::new()));
+    }
+
+    #[test]
+    fn a_robot_yaml_is_not_a_mission() {
+        let faults = parse("robot.yaml", "urdf: a.urdf\nstart: {x_m: 1}\nrobot: b\n").expect_err("foreign keys").0;
+        assert_eq!(faults.iter().map(|d| d.code).collect::<Vec<_>>(), ["yaml/unknown-key"; 2]);
+    }
+
+    fn same_keys(table: &'static [Field], schema: &serde_json::Value) {
+        let properties = schema["properties"].as_object().expect("properties");
+        assert!(properties.keys().eq(table.iter().map(|f| f.key)));
+        assert_eq!(schema["additionalProperties"], false);
+        for field in table {
+            match &field.shape {
+                Shape::Table(inner) => same_keys(inner, &properties[field.key]),
+                Shape::Named(Shape::Table(inner)) => same_keys(inner, &properties[field.key]["additionalProperties"]),
+                _ => {}
+            }
+        }
+    }
+
+    #[test]
+    fn the_schema_has_exactly_the_keys_that_the_parser_knows() {
+        same_keys(&ROBOT, &json_schema());
+        assert_eq!(json_schema()["required"], serde_json::json!(["urdf"]));
+    }
+
+    #[test]
+    fn every_example_in_the_documentation_of_a_key_is_good() {
+        for field in &ROBOT {
+            good(&format!("{}{}: {}\n", if field.key == "urdf" { "" } else { "urdf: a\n" }, field.key, field.example));
+        }
+        for (table, fields) in [("drive", &DRIVE[2..]), ("joints", &JOINTS[..]), ("collision", &COLLISION[..])] {
+            for field in fields {
+                good(&format!("urdf: a\n{table}: {{{}: {}}}\n", field.key, field.example));
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn damaged_and_arbitrary_texts_never_panic(
+            edits in proptest::collection::vec((0..FULL.len(), 0usize..12, "[-0-9a-z:,.{}\\[\\] \n\"é]{0,6}"), 1..5),
+            noise in "\\PC{0,60}",
+        ) {
+            let mut bytes = FULL.as_bytes().to_vec();
+            for (at, length, piece) in edits {
+                let at = at.min(bytes.len());
+                bytes.splice(at..(at + length).min(bytes.len()), piece.bytes());
+            }
+            for text in [String::from_utf8_lossy(&bytes).into_owned(), noise] {
+                if let Err(faults) = parse("robot.yaml", &text) {
+                    prop_assert!(faults.0.iter().all(|d| d.at.is_some() && d.hint.is_some()), "{:?}", faults);
+                    prop_assert!(!render(&faults, false).is_empty());
+                }
+            }
+        }
+    }
+}
