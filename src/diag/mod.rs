@@ -3,6 +3,7 @@
 pub mod json_schema;
 mod render;
 pub mod shape;
+mod words;
 pub mod yaml;
 
 use std::ops::Range;
