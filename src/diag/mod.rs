@@ -1,6 +1,10 @@
 //! Diagnostics: what is wrong, where, and what to do. `render` is the only code that formats one.
 
+pub mod json_schema;
 mod render;
+pub mod shape;
+mod words;
+pub mod yaml;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -8,7 +12,7 @@ use std::sync::Arc;
 pub use render::render;
 
 /// A text that a person wrote, kept for quoting.
-#[derive(Debug, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub struct Source {
     /// Path as the user knows it.
     pub name: String,
@@ -146,27 +150,76 @@ impl<E: Describe> From<Vec<E>> for Diagnostics {
     }
 }
 
-/// The known name nearest to a wrong one, if it is near enough to be meant.
+/// The known name nearest to a wrong one, if it is near enough to be meant: few letters differ (case apart), or one is the
+/// other with a unit (`yaw_deg`, `clearance`).
 pub fn nearest<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    if wrong.is_empty() || wrong.len() > 100 {
+        return None;
+    }
+    let lower = wrong.to_lowercase();
+    let unit_apart = |long: &str, short: &str| long.strip_prefix(short).is_some_and(|rest| rest.starts_with('_'));
     known
         .into_iter()
-        .map(|name| (edit_distance(wrong, name), name))
-        .filter(|(d, name)| *d <= 1 + name.len().max(wrong.len()) / 3)
-        .min_by_key(|(d, _)| *d)
-        .map(|(_, name)| name)
+        .map(|name| {
+            let (short, long) = (name.len().min(wrong.len()), name.len().max(wrong.len()));
+            let far = long - short > long.div_ceil(3);
+            let distance = if far { long } else { edit_distance(&lower, &name.to_lowercase()) };
+            let meant = (distance <= long.div_ceil(3) && distance < short)
+                || unit_apart(&lower, name)
+                || unit_apart(name, &lower);
+            (meant, distance, name)
+        })
+        .filter(|(meant, _, _)| *meant)
+        .min_by_key(|(_, distance, _)| *distance)
+        .map(|(_, _, name)| name)
 }
 
+/// Letters to insert, remove, replace or swap with their neighbour.
 fn edit_distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, ca) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, cb) in b.iter().enumerate() {
-            let substituted = diagonal + usize::from(ca != *cb);
-            diagonal = row[j + 1];
-            row[j + 1] = substituted.min(diagonal + 1).min(row[j] + 1);
+    let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
+    let mut rows: Vec<Vec<usize>> = vec![(0..=b.len()).collect()];
+    for i in 1..=a.len() {
+        let mut row = vec![i];
+        for j in 1..=b.len() {
+            let replaced = rows[i - 1][j - 1] + usize::from(a[i - 1] != b[j - 1]);
+            let mut least = replaced.min(rows[i - 1][j] + 1).min(row[j - 1] + 1);
+            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+                least = least.min(rows[i - 2][j - 2] + 1);
+            }
+            row.push(least);
+        }
+        rows.push(row);
+    }
+    rows[a.len()][b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_name_is_the_one_that_was_meant() {
+        let keys = ["robot", "map", "start", "goal", "clearance_m", "sampling_time_s", "sampling", "yaw", "x_m", "eta"];
+        for (wrong, meant) in [
+            ("mpa", "map"),
+            ("goals", "goal"),
+            ("strat", "start"),
+            ("clearance", "clearance_m"),
+            ("yaw_deg", "yaw"),
+            ("x", "x_m"),
+            ("Robot", "robot"),
+            ("sampling_time", "sampling_time_s"),
+            ("samplig", "sampling"),
+        ] {
+            assert_eq!(nearest(wrong, keys), Some(meant), "{wrong}");
+        }
+        for wrong in ["", "a", "q", "colour", "résumé"] {
+            assert_eq!(nearest(wrong, keys), None, "{wrong}");
         }
     }
-    row[b.len()]
+
+    #[test]
+    fn a_key_of_a_megabyte_is_compared_at_once() {
+        assert_eq!(nearest(&"k".repeat(1 << 20), ["goal"]), None);
+    }
 }

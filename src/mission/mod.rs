@@ -1,9 +1,14 @@
 //! Stage 1: what the user asks for. YAML text in, [`Mission`] out; all defaults applied, all numbers SI and finite.
 
+mod fields;
+pub(crate) mod limits;
+mod read;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 
-use crate::diag::Diagnostics;
+use crate::diag::{Diagnostics, Source, Span, json_schema};
 
 /// A mission, as written plus defaults. File names are as written, relative to the mission's folder.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,6 +39,48 @@ pub struct Mission {
     pub path_error_times: Vec<f64>,
     /// Overrides of the robot's limits.
     pub limits: LimitsSpec,
+    /// The text it was read from.
+    pub source: Arc<Source>,
+    /// Where in the text things are written.
+    pub spans: MissionSpans,
+}
+
+/// Where in a mission's text things are written, for faults that only later stages can see. `None`: not written.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct MissionSpans {
+    /// The value of `robot`.
+    pub robot: Option<Span>,
+    /// `map` with its value.
+    pub map: Option<Span>,
+    /// The value of `map.file`.
+    pub map_file: Option<Span>,
+    /// The value of `map.resolution_m`.
+    pub map_resolution: Option<Span>,
+    /// The value of `map.height_m`.
+    pub map_height: Option<Span>,
+    /// `start` with its value.
+    pub start: Option<Span>,
+    /// `goal` with its value.
+    pub goal: Option<Span>,
+    /// `path` with its value.
+    pub path: Option<Span>,
+    /// The value of `path.file`.
+    pub path_file: Option<Span>,
+    /// The value of `time_law`.
+    pub time_law: Option<Span>,
+    /// Every joint that is named, in the order start, goal, limits.
+    pub joints: Vec<NamedJoint>,
+}
+
+/// A joint that a mission names.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedJoint {
+    /// As written.
+    pub name: String,
+    /// `start`, `goal` or `limits.joints`.
+    pub under: &'static str,
+    /// The name's place.
+    pub at: Span,
 }
 
 /// `map:` of a mission.
@@ -160,6 +207,20 @@ pub struct BaseLimitsSpec {
 /// # Errors
 /// All faults found: YAML syntax, unknown keys (with the nearest known one), missing keys, values out of range.
 pub fn parse(name: &str, text: &str) -> Result<Mission, Diagnostics> {
-    let _ = (name, text);
-    todo!()
+    read::parse(name, text)
 }
+
+/// JSON Schema (draft 2020-12) of a mission file, from the table of keys that [`parse`] checks against.
+pub fn json_schema() -> serde_json::Value {
+    let planned = serde_json::json!({"required": ["map", "start", "goal"]});
+    let given = serde_json::json!({"required": ["path"]});
+    json_schema::document(
+        "trajc mission",
+        "What trajc compiles: a robot, a map, a start and a goal, or a given path.",
+        &fields::MISSION,
+        &[("anyOf", serde_json::json!([planned, given]))],
+    )
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,193 @@
+//! The keys of a mission file.
+
+use super::{Sampling, TimeLaw};
+use crate::diag::shape::{Bounds, Choice, Field, LARGE, Shape};
+
+const METRES: Shape = Shape::Number(Bounds::any("m"));
+/// Shorter than 0.1 ms no controller holds a command, and the table would not fit in memory.
+const SAMPLING_TIME: Shape = Shape::Number(Bounds::between(1e-4, 10.0, "s"));
+
+/// The keys of a mission file.
+pub(super) static MISSION: [Field; 13] = [
+    Field::required(
+        "robot",
+        Shape::Text,
+        "../robots/scr_db/robot.yaml",
+        "the robot: a robot.yaml, or a .urdf alone; relative to the mission",
+    ),
+    Field::optional(
+        "map",
+        Shape::Table(&MAP),
+        "{file: ../maps/arch_bridges.pcd}",
+        "where the obstacles are; may be left out only with a given `path`",
+    ),
+    Field::optional(
+        "start",
+        Shape::Table(&POSE),
+        "{x_m: 0.5, y_m: 0.5, yaw: 0deg}",
+        "where the robot stands; a joint left out is the compiler's choice",
+    ),
+    Field::optional(
+        "goal",
+        Shape::Table(&POSE),
+        "{x_m: 9.0, y_m: 8.0, yaw: 90deg}",
+        "where it must come to rest; yaw or joints left out are the compiler's choice",
+    ),
+    Field::optional(
+        "via",
+        Shape::Later(
+            "a later version will drive through given points; until then remove it, or write one mission a stretch",
+        ),
+        "[{x_m: 4.0, y_m: 4.0}]",
+        "points to drive through",
+    ),
+    Field::optional(
+        "clearance_m",
+        Shape::Number(Bounds::between(0.0, LARGE, "m")),
+        "0.05",
+        "distance to every obstacle that the certificate must prove, metres; default 0.05",
+    ),
+    Field::optional(
+        "sampling_time_s",
+        SAMPLING_TIME,
+        "0.1",
+        "seconds for which the robot holds each command; default 0.1",
+    ),
+    Field::optional(
+        "sampling",
+        Shape::Choice(&SAMPLING),
+        "mean",
+        "how wheel speeds become held commands; default mean",
+    ),
+    Field::optional(
+        "time_law",
+        Shape::Choice(&TIME_LAW),
+        "auto",
+        "how the path is timed; default auto: the fastest that keeps every limit",
+    ),
+    Field::optional("reverse", Shape::Flag, "true", "whether the robot may drive backwards; default false"),
+    Field::optional(
+        "path_error",
+        Shape::Table(&PATH_ERROR),
+        "{sampling_times_s: [0.01, 0.1]}",
+        "the report of path error against sampling time",
+    ),
+    Field::optional(
+        "limits",
+        Shape::Table(&super::limits::FIELDS),
+        "{wheel: {acceleration_mps2: 0.2}}",
+        "limits that win over the robot's, key by key",
+    ),
+    Field::optional("path", Shape::Table(&PATH), "{file: path.csv}", "a given path instead of `map` and `goal`"),
+];
+
+static MAP: [Field; 5] = [
+    Field::required(
+        "file",
+        Shape::Text,
+        "../maps/arch_bridges.pcd",
+        "the map: .pcd, .ply, .xyz, .csv, .npy, or a map_server .yaml; relative to the mission",
+    ),
+    Field::optional(
+        "resolution_m",
+        Shape::Number(Bounds::positive("m")),
+        "0.05",
+        "cell size of point clouds, metres; default 0.05; grids bring their own",
+    ),
+    Field::optional(
+        "height_m",
+        Shape::List { item: &METRES, count: (2, 2), form: "[floor, ceiling] in metres: 2 numbers" },
+        "[0.02, 1.0]",
+        "slab that holds obstacles, metres; default: 0.02 to the top of the robot",
+    ),
+    Field::optional(
+        "unknown",
+        Shape::Choice(&UNKNOWN),
+        "occupied",
+        "what space counts as that was never seen; default occupied",
+    ),
+    Field::optional(
+        "origin_m",
+        Shape::List { item: &METRES, count: (3, 3), form: "[x, y, z] in metres: 3 numbers" },
+        "[0, 0, 0]",
+        "lower corner of a .npy grid, metres",
+    ),
+];
+
+pub(super) static POSE: [Field; 4] = [
+    Field::optional("x_m", METRES, "0.5", "metres, map frame"),
+    Field::optional("y_m", METRES, "0.5", "metres, map frame"),
+    Field::optional(
+        "yaw",
+        Shape::Angle(Bounds::any("rad")),
+        "90deg",
+        "heading, radians or degrees, counter-clockwise from x",
+    ),
+    Field::optional(
+        "joints",
+        Shape::Named(&Shape::Angle(Bounds::any("rad or m"))),
+        "{blade: 90deg}",
+        "joint positions by name: radians, metres or degrees",
+    ),
+];
+
+static UNKNOWN: [Choice; 2] = [Choice::now("occupied"), Choice::now("free")];
+
+static SAMPLING: [Choice; 3] = [
+    Choice::now("mean"),
+    Choice::now("instant"),
+    Choice::later(
+        "tracked",
+        "a later version will have it; use `mean`, which keeps wheels, joints and heading in time",
+    ),
+];
+
+static TIME_LAW: [Choice; 7] = [
+    Choice::now("auto"),
+    Choice::later("optimal", "a later version will have it; use `auto`, the fastest law there is now"),
+    Choice::later("wheel", "a later version will have it; use `auto`, the fastest law there is now"),
+    Choice::now("fixed_point"),
+    Choice::now("eq5"),
+    Choice::now("printed"),
+    Choice::now("minco"),
+];
+
+static PATH_ERROR: [Field; 1] = [Field::required(
+    "sampling_times_s",
+    Shape::List { item: &SAMPLING_TIME, count: (1, 100), form: "a list of 1 to 100 sampling times in seconds" },
+    "[0.01, 0.1]",
+    "sampling times to report the path error for, seconds; default 0.01 to 0.5",
+)];
+
+static POINT: Shape = Shape::List { item: &METRES, count: (2, 2), form: "a point [x, y] in metres: 2 numbers" };
+static SEGMENT: Shape = Shape::List { item: &POINT, count: (4, 4), form: "a cubic segment of 4 control points [x, y]" };
+
+pub(super) static PATH: [Field; 2] = [
+    Field::optional(
+        "bezier",
+        Shape::List { item: &SEGMENT, count: (1, usize::MAX), form: "a list of cubic segments, at least one" },
+        "[[[0, 0], [2, 0], [4, 2], [4, 4]]]",
+        "cubic segments of four control points [x, y] in metres, each beginning where the last one ends",
+    ),
+    Field::optional(
+        "file",
+        Shape::Text,
+        "path.csv",
+        "a CSV with columns x_m, y_m[, joint.NAME.pos_rad|_m]; relative to the mission",
+    ),
+];
+
+/// What the words of `sampling` stand for.
+pub(super) static SAMPLING_LAWS: [(&str, Sampling); 3] =
+    [("mean", Sampling::Mean), ("instant", Sampling::Instant), ("tracked", Sampling::Tracked)];
+
+/// What the words of `time_law` stand for.
+pub(super) static TIME_LAWS: [(&str, TimeLaw); 7] = [
+    ("auto", TimeLaw::Auto),
+    ("optimal", TimeLaw::Optimal),
+    ("wheel", TimeLaw::Wheel),
+    ("fixed_point", TimeLaw::FixedPoint),
+    ("eq5", TimeLaw::Eq5),
+    ("printed", TimeLaw::Printed),
+    ("minco", TimeLaw::Minco),
+];
