@@ -1,7 +1,20 @@
 //! Stage 2: the robot. URDF and robot.yaml text in, [`RobotModel`] out.
 
+mod bodies;
 pub mod convex;
+mod describe;
+mod drive;
+pub mod hull;
+mod joints;
+mod limits;
+pub mod mesh;
+mod reach;
+mod shapes;
 pub mod spec;
+#[cfg(test)]
+mod tests;
+mod tree;
+mod urdf;
 
 use std::path::Path;
 
@@ -9,7 +22,9 @@ use nalgebra::{Isometry3, Unit, Vector3};
 
 use crate::diag::Diagnostics;
 use crate::mission::LimitsSpec;
+pub use bodies::NoFiles;
 pub use convex::Convex;
+pub use reach::ShapeReach;
 
 /// Where a stage gets files it must name itself (meshes). `cli` reads the disk, tests and MCAP attachments memory.
 pub trait Files {
@@ -127,6 +142,18 @@ pub struct BodyMotion {
     pub prismatic: bool,
 }
 
+impl Body {
+    /// parent body <- this body at joint values `q`; for body 0: base <- root.
+    pub fn pose_in_parent(&self, q: &[f64]) -> Isometry3<f64> {
+        let Some(motion) = &self.motion else {
+            return self.origin;
+        };
+        let value = motion.multiplier * q[motion.joint] + motion.offset;
+        let moved = if motion.prismatic { tree::along(&motion.axis, value) } else { tree::about(&motion.axis, value) };
+        self.origin * moved
+    }
+}
+
 /// A convex collision shape fixed to a body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shape {
@@ -145,21 +172,8 @@ impl RobotModel {
     pub fn body_poses(&self, q: &[f64], out: &mut Vec<Isometry3<f64>>) {
         out.clear();
         for body in &self.bodies {
-            let Some(motion) = &body.motion else {
-                out.push(body.origin);
-                continue;
-            };
-            let value = motion.multiplier * q[motion.joint] + motion.offset;
-            let moved = if motion.prismatic {
-                Isometry3::translation(motion.axis.x * value, motion.axis.y * value, motion.axis.z * value)
-            } else {
-                Isometry3::from_parts(
-                    Default::default(),
-                    nalgebra::UnitQuaternion::from_axis_angle(&motion.axis, value),
-                )
-            };
-            let parent = out[body.parent];
-            out.push(parent * body.origin * moved);
+            let pose = body.pose_in_parent(q);
+            out.push(if body.motion.is_none() { pose } else { out[body.parent] * pose });
         }
     }
 
@@ -186,8 +200,39 @@ pub struct RobotInputs<'a> {
 /// Reads a robot.
 ///
 /// # Errors
-/// All faults found, with file and line.
+/// All faults found, with file and line. Faults of the text hide those of the tree, and these those of wheels, joints and limits.
 pub fn parse(inputs: RobotInputs<'_>) -> Result<RobotModel, Diagnostics> {
-    let _ = inputs.urdf;
-    todo!()
+    let RobotInputs { spec, urdf: (name, text), files, overrides } = inputs;
+    let urdf = urdf::read(name, text)?;
+    let tree = tree::Tree::new(&urdf)?;
+    let wheels = drive::wheels(spec, &urdf, &tree)?;
+    let roles = joints::roles(spec, &urdf, &tree, &wheels)?;
+    let drive = drive::drive(spec, &urdf, &tree, &wheels, |joint| roles.at_zero(joint))?;
+
+    let mut overrides = limits::Overrides { spec, mission: overrides, faults: Vec::new() };
+    overrides.names(&urdf, &wheels);
+    let wheel = overrides.wheel(&urdf, &wheels, &drive);
+    let base = overrides.base(&wheel, &drive);
+    let joints = overrides.joints(&urdf, &roles);
+    let mut faults = overrides.faults;
+    bodies::check_links(spec, &urdf, &mut faults);
+    let collapsed = bodies::collapse(&urdf, &tree, &roles, drive.base_from_root);
+    let shapes = bodies::collision_shapes(spec, &urdf, &collapsed, files, &mut faults);
+    if !faults.is_empty() {
+        return Err(Diagnostics(faults));
+    }
+    let pairs = spec.ignore_pairs.iter().map(|[a, b]| [a.value.clone(), b.value.clone()]);
+    Ok(RobotModel {
+        name: spec.name.clone().unwrap_or_else(|| urdf.robot.name.clone()),
+        wheel_radius: drive.wheel_radius,
+        track_width: drive.track_width,
+        root_link: urdf.robot.links[tree.root].name.clone(),
+        base_from_root: drive.base_from_root,
+        joints,
+        bodies: collapsed.bodies,
+        shapes,
+        wheel,
+        base,
+        ignore_pairs: pairs.collect(),
+    })
 }

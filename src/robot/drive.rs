@@ -1,0 +1,254 @@
+//! The driving wheels: which joints, how large, and the base frame that they define.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use urdf_rs::{Geometry, JointType};
+
+use super::joints::named;
+use super::spec::RobotSpec;
+use super::tree::{self, Tree};
+use super::urdf::Urdf;
+use crate::diag::{Diagnostic, Diagnostics};
+
+/// Angle below which axes count as parallel, rad: published angles are rounded (-1.57 for -pi/2).
+const PARALLEL: f64 = 0.01;
+/// Largest difference of wheel radii, m.
+const RADIUS_TOLERANCE: f64 = 1e-4;
+
+/// Joints of the driving wheels.
+pub(super) struct Wheels {
+    pub left: Vec<usize>,
+    pub right: Vec<usize>,
+}
+
+impl Wheels {
+    /// All of them, left ones first.
+    pub fn all(&self) -> impl Iterator<Item = usize> {
+        self.left.iter().chain(&self.right).copied()
+    }
+}
+
+/// What the wheels say about the robot.
+pub(super) struct Drive {
+    pub wheel_radius: f64,
+    pub track_width: f64,
+    pub base_from_root: Isometry3<f64>,
+}
+
+/// The driving wheels, named in robot.yaml or found.
+pub(super) fn wheels(spec: &RobotSpec, urdf: &Urdf, tree: &Tree) -> Result<Wheels, Diagnostics> {
+    match (&spec.drive_left[..], &spec.drive_right[..]) {
+        ([], []) => Ok(find(urdf, tree)?),
+        ([], [one, ..]) | ([one, ..], []) => {
+            let (given, missing) = if spec.drive_left.is_empty() { ("right", "left") } else { ("left", "right") };
+            let message = format!("drive.{given} is named, drive.{missing} is not");
+            let fault = Diagnostic::error("robot/wheels-half-named", message).maybe_at(one.span.as_ref());
+            Err(fault.hint("name both, or neither to have them found").into())
+        }
+        (left, right) => {
+            let mut faults = Vec::new();
+            let mut seen = Vec::new();
+            let mut side = |names: &[super::spec::Written<String>]| -> Vec<usize> {
+                let mut found = Vec::new();
+                for name in names {
+                    let Some(j) = named(urdf, name, "drive wheel", &mut faults) else { continue };
+                    let joint = &urdf.robot.joints[j];
+                    if !matches!(joint.joint_type, JointType::Continuous | JointType::Revolute) {
+                        let kind = format!("{:?}", joint.joint_type).to_lowercase();
+                        let message = format!("drive wheel `{}` is a {kind} joint, which does not turn", joint.name);
+                        faults.push(Diagnostic::error("robot/wheel-type", message).maybe_at(name.span.as_ref()));
+                    } else if seen.contains(&j) {
+                        let message = format!("drive wheel `{}` is named twice", joint.name);
+                        faults.push(Diagnostic::error("robot/wheel-twice", message).maybe_at(name.span.as_ref()));
+                    } else {
+                        seen.push(j);
+                        found.push(j);
+                    }
+                }
+                found
+            };
+            let wheels = Wheels { left: side(left), right: side(right) };
+            if faults.is_empty() { Ok(wheels) } else { Err(Diagnostics(faults)) }
+        }
+    }
+}
+
+/// The only two coaxial continuous joints with a horizontal axis that hang on no other continuous joint.
+fn find(urdf: &Urdf, tree: &Tree) -> Result<Wheels, Diagnostic> {
+    let joints = &urdf.robot.joints;
+    let turns = |j: usize| joints[j].joint_type == JointType::Continuous;
+    // Links beyond a continuous joint, which is how castors hang.
+    let mut swivels = vec![false; urdf.robot.links.len()];
+    for j in &tree.order {
+        swivels[tree.child[*j]] = swivels[tree.parent[*j]] || turns(*j);
+    }
+    let own = |j: &usize| turns(*j) && joints[*j].mimic.is_none() && !swivels[tree.parent[*j]];
+    let candidates: Vec<usize> = (0..joints.len()).filter(own).collect();
+    let poses = tree.link_poses(urdf, |_| 0.0);
+    let axes: Vec<Axle> = candidates.iter().map(|j| Axle::of(urdf, tree, &poses, *j)).collect();
+
+    let mut pairs = Vec::new();
+    for (l, left) in axes.iter().enumerate() {
+        for (r, right) in axes.iter().enumerate() {
+            let apart = left.origin - right.origin;
+            if apart.y > 1e-6 && left.horizontal() && left.parallel(&right.axis) && left.parallel(&apart) {
+                pairs.push((candidates[l], candidates[r]));
+            }
+        }
+    }
+    if let [(left, right)] = pairs[..] {
+        return Ok(Wheels { left: vec![left], right: vec![right] });
+    }
+    let list: Vec<String> = candidates
+        .iter()
+        .zip(&axes)
+        .map(|(j, a)| {
+            let (o, level) = (a.origin, if a.horizontal() { "" } else { ", axis not horizontal" });
+            format!("`{}` at ({:.3}, {:.3}, {:.3}){level}", joints[*j].name, o.x, o.y, o.z)
+        })
+        .collect();
+    let list = if list.is_empty() { "none".into() } else { list.join("; ") };
+    let message = format!(
+        "drive wheels not found: {} coaxial pairs, not one; continuous joints that could be wheels: {list}",
+        pairs.len()
+    );
+    let fault = Diagnostic::error("robot/wheels-not-found", message).at(&urdf.whole());
+    Err(fault.hint("name drive.left and drive.right in robot.yaml"))
+}
+
+/// A wheel joint's axis and origin, in the root frame.
+struct Axle {
+    origin: Vector3<f64>,
+    axis: Vector3<f64>,
+}
+
+impl Axle {
+    fn of(urdf: &Urdf, tree: &Tree, link_poses: &[Isometry3<f64>], joint: usize) -> Self {
+        // The child's frame: a turn about the axis moves neither origin nor axis.
+        let pose = link_poses[tree.child[joint]];
+        Self {
+            origin: pose.translation.vector,
+            axis: pose.rotation * tree::axis(&urdf.robot.joints[joint]).into_inner(),
+        }
+    }
+
+    fn horizontal(&self) -> bool {
+        self.axis.z.abs() < PARALLEL
+    }
+
+    fn parallel(&self, other: &Vector3<f64>) -> bool {
+        self.axis.cross(other).norm() < PARALLEL * other.norm()
+    }
+}
+
+/// Wheel radius, track width and base frame; `value` holds every joint of the URDF at zero posture.
+pub(super) fn drive(
+    spec: &RobotSpec,
+    urdf: &Urdf,
+    tree: &Tree,
+    wheels: &Wheels,
+    value: impl Fn(usize) -> f64,
+) -> Result<Drive, Diagnostics> {
+    let poses = tree.link_poses(urdf, value);
+    let joints = &urdf.robot.joints;
+    let axle = |j: &usize| Axle::of(urdf, tree, &poses, *j);
+    let (left, right): (Vec<Axle>, Vec<Axle>) =
+        (wheels.left.iter().map(axle).collect(), wheels.right.iter().map(axle).collect());
+    let mean = |side: &[Axle]| side.iter().map(|a| a.origin).sum::<Vector3<f64>>() / side.len() as f64;
+    let across = mean(&left) - mean(&right);
+    let at = &urdf.joint_spans[wheels.left[0]];
+    let (mut faults, mut axes_good) = (Vec::new(), true);
+
+    let first = &left[0];
+    for (axle, j) in left.iter().chain(&right).zip(wheels.all()) {
+        let name = &joints[j].name;
+        let angle = axle.axis.cross(&first.axis).norm().min(1.0).asin();
+        if !axle.horizontal() {
+            let tilt = axle.axis.z.abs().min(1.0).asin().to_degrees();
+            let message = format!("axis of drive wheel `{name}` is not horizontal: tilted by {tilt:.2} degrees");
+            faults.push(Diagnostic::error("robot/wheel-not-horizontal", message).at(&urdf.joint_spans[j]));
+            axes_good = false;
+        } else if !axle.parallel(&first.axis) {
+            let (other, degrees) = (&joints[wheels.left[0]].name, angle.to_degrees());
+            let message = format!("axes of drive wheels `{other}` and `{name}` are not parallel: {degrees:.2} degrees");
+            faults.push(Diagnostic::error("robot/wheels-not-parallel", message).at(&urdf.joint_spans[j]));
+            axes_good = false;
+        }
+    }
+    let distance = across.norm();
+    if distance < 1e-6 {
+        let message = format!("the left and right drive wheels are at one place ({distance:.6} m apart)");
+        faults.push(Diagnostic::error("robot/zero-track", message).at(at));
+    } else if axes_good && !first.parallel(&across) {
+        let off = first.axis.cross(&across).norm();
+        let message =
+            format!("drive wheels are not coaxial: {distance:.4} m apart, the right {off:.4} m off the left's axis");
+        faults.push(Diagnostic::error("robot/wheels-not-coaxial", message).at(at));
+    }
+    let track_width = match &spec.track_width {
+        Some(given) if !(given.value.is_finite() && given.value > 0.0) => {
+            let message = format!("drive.track_width_m is {}, not above 0", given.value);
+            faults.push(Diagnostic::error("robot/zero-track", message).maybe_at(given.span.as_ref()));
+            given.value
+        }
+        Some(given) => given.value,
+        None => distance,
+    };
+    let wheel_radius = wheel_radius(spec, urdf, tree, wheels, &mut faults);
+    let Some(wheel_radius) = wheel_radius.filter(|_| faults.is_empty()) else {
+        return Err(Diagnostics(faults));
+    };
+
+    let y = Vector3::new(across.x, across.y, 0.0).normalize();
+    let axes = Matrix3::from_columns(&[Vector3::new(y.y, -y.x, 0.0), y, Vector3::z()]);
+    let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
+    let floor = (mean(&left) + mean(&right)) / 2.0 - Vector3::new(0.0, 0.0, wheel_radius);
+    let root_from_base = Isometry3::from_parts(Translation3::from(floor), turn);
+    debug_assert!((root_from_base * Point3::origin() - Point3::from(floor)).norm() < 1e-9);
+    Ok(Drive { wheel_radius, track_width, base_from_root: root_from_base.inverse() })
+}
+
+/// The radius given in robot.yaml, else that of the wheels' cylinders and spheres; they must agree in both cases.
+fn wheel_radius(
+    spec: &RobotSpec,
+    urdf: &Urdf,
+    tree: &Tree,
+    wheels: &Wheels,
+    faults: &mut Vec<Diagnostic>,
+) -> Option<f64> {
+    let of = |j: usize| -> Option<f64> {
+        urdf.robot.links[tree.child[j]].collision.iter().find_map(|c| match c.geometry {
+            Geometry::Cylinder { radius, .. } | Geometry::Sphere { radius } => Some(radius),
+            _ => None,
+        })
+    };
+    let known: Vec<(usize, f64)> = wheels.all().filter_map(|j| Some((j, of(j)?))).collect();
+    for (j, radius) in known.iter().skip(1) {
+        let (first, expected) = known[0];
+        if (radius - expected).abs() > RADIUS_TOLERANCE {
+            let name = |j: usize| &urdf.robot.joints[j].name;
+            let message = format!(
+                "drive wheels differ: radius {expected:.4} m (`{}`), {radius:.4} m (`{}`)",
+                name(first),
+                name(*j)
+            );
+            faults.push(Diagnostic::error("robot/unequal-wheels", message).at(&urdf.joint_spans[*j]));
+        }
+    }
+    match (&spec.wheel_radius, known.first()) {
+        (Some(given), _) if given.value.is_finite() && given.value > 0.0 => Some(given.value),
+        (Some(given), _) => {
+            let message = format!("drive.wheel_radius_m is {}, not above 0", given.value);
+            faults.push(Diagnostic::error("robot/wheel-radius", message).maybe_at(given.span.as_ref()));
+            None
+        }
+        (None, Some((_, radius))) if *radius > 0.0 => Some(*radius),
+        (None, _) => {
+            let joint = wheels.left[0];
+            let link = &urdf.robot.links[tree.child[joint]].name;
+            let message = format!("wheel radius unknown: link `{link}` has no collision cylinder or sphere");
+            let fault = Diagnostic::error("robot/wheel-radius", message).at(&urdf.joint_spans[joint]);
+            faults.push(fault.hint("give drive.wheel_radius_m in robot.yaml"));
+            None
+        }
+    }
+}

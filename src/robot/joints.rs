@@ -1,0 +1,175 @@
+//! What each joint of the URDF does: moved by the planner, held, or following another by `<mimic>`.
+
+use urdf_rs::JointType;
+
+use super::drive::Wheels;
+use super::spec::{RobotSpec, Written};
+use super::tree::Tree;
+use super::urdf::Urdf;
+use crate::diag::{Diagnostic, Diagnostics, nearest};
+
+/// Value of a joint of the URDF.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Value {
+    /// Constant.
+    Held(f64),
+    /// `multiplier * q[joint] + offset`; the multiplier is not zero.
+    Driven {
+        /// Index among the moving joints.
+        joint: usize,
+        multiplier: f64,
+        offset: f64,
+    },
+}
+
+/// Roles of all joints.
+pub(super) struct Roles {
+    /// URDF indices of the moving joints.
+    pub moving: Vec<usize>,
+    /// By URDF index.
+    pub values: Vec<Value>,
+}
+
+impl Roles {
+    /// Value of a joint with all moving joints at 0.
+    pub fn at_zero(&self, joint: usize) -> f64 {
+        match self.values[joint] {
+            Value::Held(value) => value,
+            Value::Driven { offset, .. } => offset,
+        }
+    }
+}
+
+/// Index of a joint that robot.yaml names; unknown ones are faults.
+pub(super) fn named(urdf: &Urdf, name: &Written<String>, what: &str, faults: &mut Vec<Diagnostic>) -> Option<usize> {
+    let found = urdf.robot.joints.iter().position(|j| j.name == name.value);
+    if found.is_none() {
+        let message = format!("{what} `{}`: no such joint in {}", name.value, urdf.source.name);
+        let mut fault = Diagnostic::error("robot/unknown-joint", message).maybe_at(name.span.as_ref());
+        if let Some(near) = nearest(&name.value, urdf.robot.joints.iter().map(|j| j.name.as_str())) {
+            fault = fault.hint(format!("did you mean `{near}`?"));
+        }
+        faults.push(fault);
+    }
+    found
+}
+
+/// A joint's URDF speed limit; zero and infinity mean none.
+pub(super) fn velocity(joint: &urdf_rs::Joint) -> Option<f64> {
+    Some(joint.limit.velocity).filter(|v| *v > 0.0 && v.is_finite())
+}
+
+/// Positions that the URDF allows; infinite where it says nothing.
+pub(super) fn range(urdf: &Urdf, joint: usize) -> [f64; 2] {
+    match urdf.robot.joints[joint].joint_type {
+        JointType::Revolute | JointType::Prismatic if urdf.has_limit[joint] => {
+            let limit = &urdf.robot.joints[joint].limit;
+            [limit.lower, limit.upper]
+        }
+        _ => [f64::NEG_INFINITY, f64::INFINITY],
+    }
+}
+
+/// Decides what every joint does.
+///
+/// # Errors
+/// Names that do not exist; moving or fixed joints that are wheels, mimics, rigid or named twice; held values beyond the joint's
+/// limits; mimics of each other.
+pub(super) fn roles(spec: &RobotSpec, urdf: &Urdf, tree: &Tree, wheels: &Wheels) -> Result<Roles, Diagnostics> {
+    let mut faults = Vec::new();
+    let joints = &urdf.robot.joints;
+    let is_wheel = |j: usize| wheels.all().any(|w| w == j);
+    let free = |j: usize| joints[j].joint_type != JointType::Fixed && joints[j].mimic.is_none() && !is_wheel(j);
+    let why_not = |j: usize| {
+        if is_wheel(j) {
+            "is a drive wheel".into()
+        } else if let Some(mimic) = &joints[j].mimic {
+            format!("is a mimic of `{}`", mimic.joint)
+        } else {
+            "is of type fixed".into()
+        }
+    };
+
+    let mut held: Vec<Option<f64>> = vec![None; joints.len()];
+    for (name, value) in &spec.fixed {
+        let Some(j) = named(urdf, name, "joints.fixed", &mut faults) else { continue };
+        let [lower, upper] = range(urdf, j);
+        let fault = if !free(j) {
+            Some(("robot/fixed-joint", format!("joints.fixed: `{}` {}", name.value, why_not(j))))
+        } else if held[j].is_some() {
+            Some(("robot/fixed-joint", format!("joints.fixed: `{}` is named twice", name.value)))
+        } else if !value.is_finite() || *value < lower - 1e-9 || *value > upper + 1e-9 {
+            let message = format!("joints.fixed: `{}` at {value} is outside its limits {lower} to {upper}", name.value);
+            Some(("robot/fixed-outside", message))
+        } else {
+            held[j] = Some(*value);
+            None
+        };
+        faults.extend(fault.map(|(code, message)| Diagnostic::error(code, message).maybe_at(name.span.as_ref())));
+    }
+
+    let mut moving = Vec::new();
+    if let Some(names) = &spec.moving {
+        for name in names {
+            let Some(j) = named(urdf, name, "joints.moving", &mut faults) else { continue };
+            let why = if !free(j) {
+                why_not(j)
+            } else if spec.fixed.iter().any(|(fixed, _)| fixed.value == name.value) {
+                "is in joints.fixed too".into()
+            } else if moving.contains(&j) {
+                "is named twice".into()
+            } else {
+                moving.push(j);
+                continue;
+            };
+            let message = format!("joints.moving: `{}` {why}", name.value);
+            faults.push(Diagnostic::error("robot/moving-joint", message).maybe_at(name.span.as_ref()));
+        }
+    } else {
+        moving =
+            (0..joints.len()).filter(|j| free(*j) && held[*j].is_none() && velocity(&joints[*j]).is_some()).collect();
+    }
+
+    let mut values = Vec::with_capacity(joints.len());
+    for j in 0..joints.len() {
+        match resolve(urdf, j, &is_wheel) {
+            Ok((source, multiplier, offset)) => values.push(match moving.iter().position(|m| *m == source) {
+                Some(joint) if multiplier != 0.0 && joints[j].joint_type != JointType::Fixed => {
+                    Value::Driven { joint, multiplier, offset }
+                }
+                Some(_) => Value::Held(offset),
+                None => {
+                    let [lower, upper] = range(urdf, source);
+                    let rest = if is_wheel(source) { 0.0 } else { 0f64.max(lower).min(upper) };
+                    Value::Held(multiplier * held[source].unwrap_or(rest) + offset)
+                }
+            }),
+            Err(fault) => faults.push(*fault),
+        }
+    }
+    debug_assert_eq!(tree.child.len(), joints.len());
+    if faults.is_empty() { Ok(Roles { moving, values }) } else { Err(Diagnostics(faults)) }
+}
+
+/// Follows mimics to their source: (source, multiplier, offset).
+fn resolve(urdf: &Urdf, joint: usize, is_wheel: &impl Fn(usize) -> bool) -> Result<(usize, f64, f64), Box<Diagnostic>> {
+    let joints = &urdf.robot.joints;
+    let (mut source, mut multiplier, mut offset) = (joint, 1.0, 0.0);
+    let mut steps = 0;
+    while let Some(mimic) = joints[source].mimic.as_ref().filter(|_| !is_wheel(source)) {
+        offset += multiplier * mimic.offset.unwrap_or(0.0);
+        multiplier *= mimic.multiplier.unwrap_or(1.0);
+        source = joints.iter().position(|j| j.name == mimic.joint).expect("urdf::read checked all names of joints");
+        steps += 1;
+        if steps > joints.len() || !(multiplier.is_finite() && offset.is_finite()) {
+            let name = &joints[joint].name;
+            let (code, message) = if source == joint || steps > joints.len() {
+                ("robot/mimic-cycle", format!("joint `{name}` follows joints that mimic each other in a circle"))
+            } else {
+                ("robot/mimic-cycle", format!("the factors of the joints that `{name}` mimics overflow"))
+            };
+            return Err(Box::new(Diagnostic::error(code, message).at(&urdf.joint_spans[joint])));
+        }
+    }
+    Ok((source, multiplier, offset))
+}

@@ -1,0 +1,365 @@
+//! URDF text to urdf-rs' model, behind a check of everything urdf-rs lets pass.
+//!
+//! urdf-rs validates neither names nor the tree nor numbers, overflows its stack on deep XML and gives no places. So the text is
+//! first read with roxmltree: depth, entities, names, references and numbers are judged there, with spans. urdf-rs then sees only
+//! what this stage uses; visuals, inertias and foreign elements are blanked, since a fault in them does not matter here.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+use roxmltree::{Attribute, Document, Node};
+
+use crate::diag::{Diagnostic, Diagnostics, Source, Span, nearest};
+
+/// Deepest nesting of elements that is read; real URDFs have about 6.
+const MAX_DEPTH: usize = 64;
+
+/// A checked URDF: names are unique, references resolve, numbers are finite.
+pub(super) struct Urdf {
+    /// The text, for quoting.
+    pub source: Arc<Source>,
+    /// What urdf-rs read.
+    pub robot: urdf_rs::Robot,
+    /// Place of each link, as in `robot.links`.
+    pub link_spans: Vec<Span>,
+    /// Place of each link's `<collision>` elements.
+    pub collision_spans: Vec<Vec<Span>>,
+    /// Place of each joint, as in `robot.joints`.
+    pub joint_spans: Vec<Span>,
+    /// Which joints have a `<limit>`.
+    pub has_limit: Vec<bool>,
+}
+
+impl Urdf {
+    /// A place for faults of the whole file: the name in `<robot>`.
+    pub fn whole(&self) -> Span {
+        let start = self.source.text.find("<robot").unwrap_or(0);
+        Span::new(&self.source, start..start + "<robot".len())
+    }
+}
+
+/// Reads and checks a URDF.
+///
+/// # Errors
+/// All faults found; those that hide others (XML syntax, depth) alone.
+pub(super) fn read(name: &str, text: &str) -> Result<Urdf, Diagnostics> {
+    let source = Arc::new(Source { name: name.into(), text: text.into() });
+    let document = Document::parse(text).map_err(|error| syntax_error(&source, &error))?;
+    check_depth(&source, &document)?;
+
+    let mut check = Check { source: &source, faults: Vec::new() };
+    let root = document.root_element();
+    if !root.has_tag_name("robot") {
+        let message = format!("the root element is <{}>, not <robot>", root.tag_name().name());
+        return Err(Diagnostic::error("robot/not-urdf", message).at(&check.start(root)).into());
+    }
+    let links: Vec<Node> = root.children().filter(|n| n.has_tag_name("link")).collect();
+    let joints: Vec<Node> = root.children().filter(|n| n.has_tag_name("joint")).collect();
+    if links.is_empty() {
+        check.fault("robot/no-links", "the URDF has no <link>", &check.start(root));
+    }
+    let link_names = check.names(&links, "link");
+    let joint_names = check.names(&joints, "joint");
+    for link in &links {
+        check.link(*link);
+    }
+    for joint in &joints {
+        check.joint(*joint, &link_names, &joint_names);
+    }
+    if !check.faults.is_empty() {
+        return Err(Diagnostics(check.faults));
+    }
+
+    let link_spans = links.iter().map(|n| check.name_span(*n)).collect();
+    let joint_spans = joints.iter().map(|n| check.name_span(*n)).collect();
+    let collision_spans = links
+        .iter()
+        .map(|n| n.children().filter(|c| c.has_tag_name("collision")).map(|c| check.start(c)).collect())
+        .collect();
+    let has_limit = joints.iter().map(|n| n.children().any(|c| c.has_tag_name("limit"))).collect();
+    let robot = urdf_rs::read_from_string(&reduced(text, root)).map_err(|error| {
+        let message = format!("not a URDF that can be read: {error}");
+        Diagnostic::error("robot/unreadable-urdf", message).at(&check.start(root))
+    })?;
+    if robot.links.len() != links.len() || robot.joints.len() != joints.len() {
+        let message = format!(
+            "{} links and {} joints are written, {} and {} were read",
+            links.len(),
+            joints.len(),
+            robot.links.len(),
+            robot.joints.len()
+        );
+        return Err(Diagnostic::error("robot/unreadable-urdf", message).at(&check.start(root)).into());
+    }
+    Ok(Urdf { source: source.clone(), robot, link_spans, collision_spans, joint_spans, has_limit })
+}
+
+fn syntax_error(source: &Arc<Source>, error: &roxmltree::Error) -> Diagnostic {
+    let at = position(&source.text, error.pos().row as usize, error.pos().col as usize);
+    let found = Diagnostic::error("robot/xml", error).at(&character(source, at));
+    if matches!(error, roxmltree::Error::DtdDetected) {
+        found.hint("a URDF needs no <!DOCTYPE> and no entities: remove them")
+    } else if source.text.contains("xacro:") {
+        found.hint("this looks like xacro: run xacro first and name its output")
+    } else {
+        found
+    }
+}
+
+/// Byte offset of a row and column (both from 1, columns in characters).
+fn position(text: &str, row: usize, column: usize) -> usize {
+    let line_start: usize = text.split_inclusive('\n').take(row.saturating_sub(1)).map(str::len).sum();
+    let rest = text.get(line_start..).unwrap_or("");
+    line_start + rest.chars().take(column.saturating_sub(1)).map(char::len_utf8).sum::<usize>()
+}
+
+/// The character that begins at byte `at`.
+fn character(source: &Arc<Source>, at: usize) -> Span {
+    let length = source.text.get(at..).and_then(|rest| rest.chars().next()).map_or(0, char::len_utf8);
+    Span::new(source, at..at + length)
+}
+
+fn check_depth(source: &Arc<Source>, document: &Document) -> Result<(), Diagnostic> {
+    // Parents come before their children, so one pass is enough, however deep the text is.
+    let mut depths: Vec<usize> = Vec::new();
+    for node in document.descendants() {
+        let depth = node.parent().and_then(|p| depths.get(p.id().get_usize())).map_or(0, |d| d + 1);
+        if depth > MAX_DEPTH {
+            let message = format!("elements are nested more than {MAX_DEPTH} deep");
+            let at = character(source, node.range().start);
+            return Err(Diagnostic::error("robot/xml-depth", message).at(&at));
+        }
+        depths.resize(node.id().get_usize(), 0);
+        depths.push(depth);
+    }
+    Ok(())
+}
+
+/// Collects faults with their places.
+struct Check<'a> {
+    source: &'a Arc<Source>,
+    faults: Vec<Diagnostic>,
+}
+
+impl Check<'_> {
+    fn fault(&mut self, code: &'static str, message: impl ToString, at: &Span) {
+        self.faults.push(Diagnostic::error(code, message).at(at));
+    }
+
+    /// The opening tag, up to its name.
+    fn start(&self, node: Node) -> Span {
+        let start = node.range().start;
+        let tag = &self.source.text[start..];
+        let length = tag.find(|c: char| c.is_whitespace() || c == '>' || c == '/').unwrap_or(tag.len());
+        Span::new(self.source, start..start + length)
+    }
+
+    fn attribute_span(&self, attribute: &Attribute) -> Span {
+        Span::new(self.source, attribute.range())
+    }
+
+    fn name_span(&self, node: Node) -> Span {
+        node.attribute_node("name").map_or_else(|| self.start(node), |a| self.attribute_span(&a))
+    }
+
+    /// Unique names of the elements; doubled and missing ones are faults.
+    fn names<'n>(&mut self, nodes: &[Node<'n, 'n>], kind: &str) -> BTreeMap<&'n str, Node<'n, 'n>> {
+        let mut names = BTreeMap::new();
+        for node in nodes {
+            match node.attribute("name").filter(|name| !name.is_empty()) {
+                None => self.fault("robot/no-name", format!("a <{kind}> without a name"), &self.start(*node)),
+                Some(name) => {
+                    if names.insert(name, *node).is_some() {
+                        let message = format!("{kind} `{name}` is there twice");
+                        self.fault("robot/doubled-name", message, &self.name_span(*node));
+                    }
+                }
+            }
+        }
+        names
+    }
+
+    fn link(&mut self, link: Node) {
+        for collision in link.children().filter(|n| n.has_tag_name("collision")) {
+            self.origin(collision);
+            let geometries: Vec<Node> = collision.children().filter(|n| n.has_tag_name("geometry")).collect();
+            let shapes: Vec<Node> = geometries.iter().flat_map(|g| g.children().filter(Node::is_element)).collect();
+            let ([_], [shape]) = (&geometries[..], &shapes[..]) else {
+                let message = "a <collision> needs one <geometry> with one shape in it";
+                self.fault("robot/geometry", message, &self.start(collision));
+                continue;
+            };
+            self.shape(*shape);
+        }
+    }
+
+    fn shape(&mut self, shape: Node) {
+        match shape.tag_name().name() {
+            "box" => self.not_negative(shape, "size", 3),
+            "sphere" => self.not_negative(shape, "radius", 1),
+            "cylinder" => {
+                self.not_negative(shape, "radius", 1);
+                self.not_negative(shape, "length", 1);
+            }
+            "mesh" => {
+                if shape.attribute("filename").is_none_or(|name| name.trim().is_empty()) {
+                    self.fault("robot/geometry", "a <mesh> without a filename", &self.start(shape));
+                }
+                self.numbers(shape, "scale", 3, false);
+            }
+            other => {
+                let message = format!("collision shape <{other}> is not supported");
+                let fault = Diagnostic::error("robot/geometry", message).at(&self.start(shape));
+                self.faults.push(fault.hint("use box, cylinder, sphere or mesh"));
+            }
+        }
+    }
+
+    fn joint(&mut self, joint: Node, links: &BTreeMap<&str, Node>, joints: &BTreeMap<&str, Node>) {
+        let name = joint.attribute("name").unwrap_or_default();
+        match joint.attribute_node("type") {
+            None => self.fault("robot/joint-type", format!("joint `{name}` has no type"), &self.name_span(joint)),
+            Some(kind) if !matches!(kind.value(), "fixed" | "revolute" | "continuous" | "prismatic") => {
+                let message = format!("joint `{name}`: type `{}` is not supported", kind.value());
+                let fault = Diagnostic::error("robot/joint-type", message).at(&self.attribute_span(&kind));
+                self.faults.push(fault.hint("use fixed, revolute, continuous or prismatic"));
+            }
+            Some(_) => {}
+        }
+        for end in ["parent", "child"] {
+            self.only_one(joint, end);
+            self.reference(joint, end, "link", links, "link");
+        }
+        for part in ["origin", "axis", "limit", "mimic"] {
+            self.only_one(joint, part);
+        }
+        self.origin(joint);
+        if let Some(axis) = joint.children().find(|n| n.has_tag_name("axis"))
+            && let Some(xyz) = self.numbers(axis, "xyz", 3, true)
+            && xyz.iter().map(|v| v * v).sum::<f64>().sqrt() < 1e-9
+        {
+            self.fault("robot/axis", format!("joint `{name}` has an axis of zero length"), &self.start(axis));
+        }
+        if let Some(limit) = joint.children().find(|n| n.has_tag_name("limit")) {
+            let bounds = ["lower", "upper"].map(|key| self.numbers(limit, key, 1, false));
+            if let [Some(lower), Some(upper)] = &bounds
+                && lower[0] > upper[0]
+            {
+                let message = format!("joint `{name}`: lower limit {} is above the upper one, {}", lower[0], upper[0]);
+                self.fault("robot/joint-limits", message, &self.start(limit));
+            }
+            if self.numbers(limit, "velocity", 1, false).is_some_and(|v| v[0] < 0.0) {
+                let message = format!("joint `{name}` has a negative velocity limit");
+                self.fault("robot/limit-not-positive", message, &self.start(limit));
+            }
+        }
+        if let Some(mimic) = joint.children().find(|n| n.has_tag_name("mimic")) {
+            self.reference(joint, "mimic", "joint", joints, "joint");
+            self.numbers(mimic, "multiplier", 1, false);
+            self.numbers(mimic, "offset", 1, false);
+        }
+    }
+
+    fn only_one(&mut self, node: Node, tag: &str) {
+        if let Some(second) = node.children().filter(|n| n.has_tag_name(tag)).nth(1) {
+            let name = node.attribute("name").unwrap_or_default();
+            self.fault("robot/doubled-element", format!("`{name}` has more than one <{tag}>"), &self.start(second));
+        }
+    }
+
+    fn reference(&mut self, node: Node, tag: &str, key: &str, known: &BTreeMap<&str, Node>, kind: &str) {
+        let name = node.attribute("name").unwrap_or_default();
+        let element = node.children().find(|n| n.has_tag_name(tag));
+        let Some(attribute) = element.and_then(|e| e.attribute_node(key)) else {
+            let message = format!("joint `{name}` has no <{tag} {key}=…>");
+            self.fault("robot/missing-element", message, &self.name_span(node));
+            return;
+        };
+        if !known.contains_key(attribute.value()) {
+            let message = format!("joint `{name}`: no {kind} `{}` in this URDF", attribute.value());
+            let mut fault = Diagnostic::error("robot/unknown-name", message).at(&self.attribute_span(&attribute));
+            if let Some(near) = nearest(attribute.value(), known.keys().copied()) {
+                fault = fault.hint(format!("did you mean `{near}`?"));
+            }
+            self.faults.push(fault);
+        }
+    }
+
+    fn origin(&mut self, node: Node) {
+        self.only_one(node, "origin");
+        if let Some(origin) = node.children().find(|n| n.has_tag_name("origin")) {
+            self.numbers(origin, "xyz", 3, false);
+            self.numbers(origin, "rpy", 3, false);
+            self.numbers(origin, "quat_xyzw", 4, false);
+        }
+    }
+
+    fn not_negative(&mut self, node: Node, key: &str, count: usize) {
+        if self.numbers(node, key, count, true).is_some_and(|v| v.iter().any(|v| *v < 0.0)) {
+            let message = format!("<{}>: {key} is negative", node.tag_name().name());
+            self.fault("robot/geometry", message, &self.start(node));
+        }
+    }
+
+    /// The attribute's numbers: exactly `count`, all finite and no larger than lengths and angles can be.
+    fn numbers(&mut self, node: Node, key: &str, count: usize, required: bool) -> Option<Vec<f64>> {
+        let Some(attribute) = node.attribute_node(key) else {
+            if required {
+                let message = format!("<{}> has no {key}", node.tag_name().name());
+                self.fault("robot/missing-element", message, &self.start(node));
+            }
+            return None;
+        };
+        let numbers: Result<Vec<f64>, _> = attribute.value().split_whitespace().map(str::parse).collect();
+        match numbers {
+            Ok(v) if v.len() == count && v.iter().all(|v| v.is_finite() && v.abs() <= 1e9) => Some(v),
+            _ => {
+                let what = if count == 1 { "one finite number".into() } else { format!("{count} finite numbers") };
+                let message = format!("{key}=\"{}\": expected {what}", attribute.value());
+                self.fault("robot/not-a-number", message, &self.attribute_span(&attribute));
+                None
+            }
+        }
+    }
+}
+
+/// The text with all that this stage does not use blanked, and `velocity="0"` (none) where a `<limit>` leaves it out: URDF asks
+/// for it before version 1.2, but published files leave it out on joints that never move.
+fn reduced(text: &str, root: Node) -> String {
+    let mut edits: Vec<(Range<usize>, &str)> = Vec::new();
+    let old = !root.attribute("version").is_some_and(|v| {
+        let (major, minor) = v.trim().split_once('.').unwrap_or(("1", "0"));
+        matches!((major.parse::<u32>(), minor.parse::<u32>()), (Ok(major), Ok(minor)) if (major, minor) >= (1, 2))
+    });
+    for part in root.children().filter(Node::is_element) {
+        let keep: &[&str] = match part.tag_name().name() {
+            "link" => &["collision"],
+            "joint" => &["origin", "parent", "child", "axis", "limit", "mimic"],
+            _ => {
+                edits.push((part.range(), ""));
+                continue;
+            }
+        };
+        for child in part.children().filter(Node::is_element) {
+            let name = child.tag_name().name();
+            if !keep.contains(&name) {
+                edits.push((child.range(), ""));
+            } else if name == "limit" {
+                let at = child.range().start + "<limit".len();
+                let plain = text[child.range()].starts_with("<limit");
+                if old && plain && child.attribute("velocity").is_none() {
+                    edits.push((at..at, " velocity=\"0\""));
+                }
+                edits.extend(child.attribute_node("effort").map(|effort| (effort.range(), "")));
+            }
+        }
+    }
+    let (mut out, mut from) = (String::with_capacity(text.len()), 0);
+    for (range, replacement) in edits {
+        out += &text[from..range.start];
+        out += replacement;
+        from = range.end;
+    }
+    out + &text[from..]
+}
