@@ -1,8 +1,36 @@
 //! Stage 3: the map. Points, voxels or an occupancy image in, [`VoxelMap`] out.
 
-use crate::diag::Diagnostics;
+mod boxes;
+mod describe;
+mod error;
+mod header;
+mod lzf;
+mod npy;
+mod occupancy;
+mod pcd;
+mod pgm;
+mod ply;
+mod points;
+#[cfg(test)]
+mod tests;
+mod text;
+mod voxelize;
+
+use std::path::{Path, PathBuf};
+
+use crate::diag::{Describe, Diagnostics};
 use crate::geom::Aabb;
 use crate::mission::{MapSpec, Unknown};
+
+use error::MapError;
+use voxelize::Slab;
+
+/// Cell size of point clouds where the mission gives none, m.
+pub const DEFAULT_RESOLUTION: f64 = 0.05;
+/// What lies lower is floor where the mission gives no `height_m`, m.
+pub const FLOOR: f64 = 0.02;
+/// Coordinates beyond this are not metres on a floor, m.
+const FARTHEST: f64 = 1e6;
 
 /// Occupied cells of a grid, cut to the slab that holds obstacles. Cell (i, j, k) spans
 /// `origin + resolution * (i, j, k)` to `origin + resolution * (i+1, j+1, k+1)`.
@@ -50,6 +78,17 @@ impl VoxelMap {
         self.bits[at] |= 1 << (cell[2] % 64);
     }
 
+    /// Marks all cells of column (i, j).
+    fn occupy_column(&mut self, i: usize, j: usize) {
+        let at = (i * self.dims[1] + j) * self.words_per_column;
+        let column = &mut self.bits[at..at + self.words_per_column];
+        column.fill(u64::MAX);
+        // Bits beyond the grid stay zero, or they would be counted.
+        if let (Some(last), rest @ 1..) = (column.last_mut(), self.dims[2] % 64) {
+            *last = (1 << rest) - 1;
+        }
+    }
+
     /// Whether a cell is occupied. The cell must be in the grid.
     pub fn occupied(&self, cell: [usize; 3]) -> bool {
         self.column(cell[0], cell[1])[cell[2] / 64] >> (cell[2] % 64) & 1 == 1
@@ -64,6 +103,16 @@ impl VoxelMap {
     /// Number of occupied cells.
     pub fn occupied_count(&self) -> usize {
         self.bits.iter().map(|w| w.count_ones() as usize).sum()
+    }
+
+    /// The occupied cells, in order of i, j, k.
+    pub fn cells(&self) -> impl Iterator<Item = [usize; 3]> + '_ {
+        let [_, ny, _] = self.dims;
+        let words = self.words_per_column;
+        self.bits.iter().enumerate().filter(|(_, bits)| **bits != 0).flat_map(move |(at, bits)| {
+            let (column, word) = (at / words, at % words);
+            (0..64).filter(move |b| bits >> b & 1 == 1).map(move |b| [column / ny, column % ny, word * 64 + b])
+        })
     }
 
     /// The cube of a cell.
@@ -92,21 +141,120 @@ pub struct MapInputs<'a> {
     pub beside: Option<(&'a str, &'a [u8])>,
 }
 
-/// The file that must (map_server image) or may (`.json` of `.npy`) lie beside a map file, as a path joined to the map's
-/// folder, and whether it must.
+/// Ending of a file's name in lower case, with its dot; empty without one.
+fn ending(name: &str) -> String {
+    Path::new(name).extension().map_or(String::new(), |e| format!(".{}", e.to_string_lossy().to_ascii_lowercase()))
+}
+
+/// The file that must (map_server image) or may (`.json` of voxels in `.npy`) lie beside a map file, as a path joined to the
+/// map's folder, and whether it must.
 ///
 /// # Errors
 /// Unreadable map_server YAML.
-pub fn beside(name: &str, bytes: &[u8]) -> Result<Option<(std::path::PathBuf, bool)>, Diagnostics> {
-    let _ = (name, bytes);
-    todo!()
+pub fn beside(name: &str, bytes: &[u8]) -> Result<Option<(PathBuf, bool)>, Diagnostics> {
+    match ending(name).as_str() {
+        ".yaml" | ".yml" => Ok(Some((occupancy::image(name, bytes).map_err(|faults| in_file(name, faults))?, true))),
+        ".npy" if npy::axes(bytes) == Some(3) => Ok(Some((Path::new(name).with_extension("json"), false))),
+        _ => Ok(None),
+    }
 }
 
 /// Reads a map. `robot_height`: top of the robot over all postures, the default of `height_m`'s upper end.
 ///
+/// A map without any obstacle in the slab is legal; one without any finite point is not.
+///
 /// # Errors
 /// All faults found: unknown format, lies in headers, truncated data, resolution that differs from the grid's own, no points.
+/// All are bad input (exit 2); what is wrong in a header or in YAML has its place there, all others name the file.
 pub fn parse(inputs: &MapInputs<'_>, spec: &MapSpec, robot_height: f64) -> Result<VoxelMap, Diagnostics> {
-    let _ = (inputs.name, spec, robot_height);
-    todo!()
+    read(inputs, spec, robot_height).map_err(|faults| in_file(inputs.name, faults))
+}
+
+/// Diagnostics of a file's faults: where no text can be quoted, the file is named.
+fn in_file(name: &str, faults: Vec<MapError>) -> Diagnostics {
+    let named = |fault: &MapError| {
+        let diagnostic = fault.diagnostic();
+        if diagnostic.at.is_some() { diagnostic } else { diagnostic.file(name) }
+    };
+    Diagnostics(faults.iter().map(named).collect())
+}
+
+fn read(inputs: &MapInputs<'_>, spec: &MapSpec, robot_height: f64) -> Result<VoxelMap, Vec<MapError>> {
+    let MapInputs { name, bytes, beside } = *inputs;
+    let [low, high] = spec.height.unwrap_or([FLOOR, robot_height.max(FLOOR)]);
+    if low.is_nan() || high.is_nan() || low > high {
+        return Err(vec![MapError::Slab { low, high }]);
+    }
+    let slab = Slab { low, high };
+    if let Some(value) = spec.resolution.filter(|r| !voxelize::usable(*r)) {
+        return Err(vec![MapError::Resolution { value, at: None }]);
+    }
+    let points = match ending(name).as_str() {
+        ".pcd" => pcd::read(name, bytes)?,
+        ".ply" => ply::read(name, bytes)?,
+        ".xyz" | ".txt" | ".csv" => text::read(bytes).map_err(|fault| vec![fault])?,
+        ".npy" => match npy::read(bytes).map_err(|fault| vec![fault])? {
+            npy::Array::Points(points) => points,
+            npy::Array::Voxels(voxels) => {
+                let (resolution, origin) = grid(beside, spec)?;
+                return voxelize::voxels(&voxels, resolution, origin, slab, spec.unknown).map_err(|fault| vec![fault]);
+            }
+        },
+        ".yaml" | ".yml" => {
+            let sheet = occupancy::sheet(name, bytes)?;
+            let mut faults = origin_unused(spec);
+            faults.extend(resolution_differs(spec, sheet.resolution));
+            return match occupancy::voxels(&sheet, beside.map(|(_, image)| image), slab, spec.unknown) {
+                Ok(map) if faults.is_empty() => Ok(map),
+                Ok(_) => Err(faults),
+                Err(fault) => Err(faults.into_iter().chain([fault]).collect()),
+            };
+        }
+        ".pgm" | ".png" => return Err(vec![MapError::ImageAlone]),
+        other => return Err(vec![MapError::Format { ending: other.to_owned() }]),
+    };
+    let faults = origin_unused(spec);
+    if !faults.is_empty() {
+        return Err(faults);
+    }
+    let resolution = spec.resolution.unwrap_or(DEFAULT_RESOLUTION);
+    voxelize::points(&points, resolution, slab, spec.unknown).map_err(|fault| vec![fault])
+}
+
+fn origin_unused(spec: &MapSpec) -> Vec<MapError> {
+    spec.origin.map(|_| MapError::OriginUnused).into_iter().collect()
+}
+
+fn resolution_differs(spec: &MapSpec, own: f64) -> Option<MapError> {
+    let asked = spec.resolution.filter(|asked| (asked - own).abs() > 1e-9 * own)?;
+    Some(MapError::ResolutionDiffers { asked, own })
+}
+
+/// What the `.json` beside a `.npy` may say; other keys are notes.
+#[derive(serde::Deserialize, Default)]
+struct Beside {
+    resolution: Option<f64>,
+    origin: Option<[f64; 3]>,
+}
+
+/// Cell size and lower corner of a `.npy` grid: the mission's origin wins; its resolution must agree.
+fn grid(beside: Option<(&str, &[u8])>, spec: &MapSpec) -> Result<(f64, [f64; 3]), Vec<MapError>> {
+    let written = match beside {
+        None => Beside::default(),
+        Some((_, bytes)) => serde_json::from_slice(bytes).map_err(|error| {
+            vec![MapError::Description { what: ".json beside it", fault: error.to_string(), at: None }]
+        })?,
+    };
+    if let Some(value) = written.resolution.filter(|r| !voxelize::usable(*r)) {
+        return Err(vec![MapError::Resolution { value, at: None }]);
+    }
+    if let Some(fault) = written.resolution.and_then(|own| resolution_differs(spec, own)) {
+        return Err(vec![fault]);
+    }
+    let resolution = written.resolution.or(spec.resolution).ok_or_else(|| vec![MapError::NoResolution])?;
+    let origin = spec.origin.or(written.origin).unwrap_or_default();
+    if !origin.iter().all(|v| v.abs() <= FARTHEST) {
+        return Err(vec![MapError::Origin { value: origin.to_vec(), limit: FARTHEST, at: None }]);
+    }
+    Ok((resolution, origin))
 }

@@ -1,0 +1,220 @@
+//! Why a map cannot be read.
+
+use crate::diag::{Describe, Diagnostic, Span};
+
+/// Endings that are read, for messages.
+pub(super) const FORMATS: &str = "point clouds .pcd, .ply, .xyz, .txt, .csv and .npy (N x 3); voxels .npy (3-D, boolean or \
+                                  integer); map_server .yaml with its .pgm";
+
+/// Why a map cannot be read. The top of the stage adds the file's name where a variant has no place in a text.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub(super) enum MapError {
+    /// The ending is not one of ours.
+    #[error("cannot read maps {}", if ending.is_empty() { "without an ending".into() } else { format!("of format `{ending}`") })]
+    Format { ending: String },
+    /// An image was named where its YAML belongs.
+    #[error("an image alone has no scale: name the map_server .yaml that belongs to it")]
+    ImageAlone,
+    /// The first bytes are not the format's.
+    #[error("not a {format} file: it does not begin with {begin}")]
+    NotThisFormat { format: &'static str, begin: &'static str },
+    /// The header does not end.
+    #[error("the {format} header has no `{last}` line")]
+    NoHeaderEnd { format: &'static str, last: &'static str },
+    /// A word of the header that is not known.
+    #[error("unknown line `{word}` in the {format} header")]
+    UnknownHeaderLine { format: &'static str, word: String, nearest: Option<String>, at: Span },
+    /// The header says the same thing twice.
+    #[error("`{word}` is given twice in the header")]
+    HeaderTwice { word: String, at: Span },
+    /// A line that must be in the header is not.
+    #[error("the {format} header has no `{word}` line")]
+    HeaderMissing { format: &'static str, word: &'static str },
+    /// A value in the header makes no sense.
+    #[error("`{word}` is `{value}`: expected {expected}")]
+    HeaderValue { word: String, value: String, expected: &'static str, at: Span },
+    /// SIZE, TYPE or COUNT do not fit FIELDS.
+    #[error("`{word}` has {got} values for {fields} fields")]
+    HeaderLength { word: String, got: usize, fields: usize, at: Span },
+    /// The organised size is not the number of points.
+    #[error("the header contradicts itself: WIDTH {width} x HEIGHT {height}, but POINTS {points}")]
+    PointsDiffer { width: u64, height: u64, points: u64, at: Span },
+    /// A coordinate is not in the file.
+    #[error("no column `{missing}`: the file has {found}")]
+    NoCoordinate { missing: char, found: String, at: Option<Span> },
+    /// Fewer bytes than the header promises.
+    #[error("truncated: {promised} {unit} promised ({promised_bytes} bytes), but only {have_bytes} bytes are there")]
+    Truncated { unit: &'static str, promised: u128, promised_bytes: u128, have_bytes: u128 },
+    /// More data than the header promises: points would be lost silently.
+    #[error(
+        "more data than the header promises: {promised} {unit} are {promised_bytes} bytes, but {have_bytes} are there"
+    )]
+    Surplus { unit: &'static str, promised: u128, promised_bytes: u128, have_bytes: u128 },
+    /// The same for rows of text.
+    #[error("{} {unit} promised, but {have} are there", promised)]
+    RowsDiffer { unit: &'static str, promised: u64, have: u64 },
+    /// A row with the wrong number of columns.
+    #[error("line {line} has {got} column{}, expected {expected}: `{text}`", if *.got == 1 { "" } else { "s" })]
+    Columns { line: u64, got: usize, expected: String, text: String },
+    /// A word that is not a number.
+    #[error("line {line}: `{word}` is not a number")]
+    NotANumber { line: u64, word: String },
+    /// A row that may have decimal commas.
+    #[error("line {line} has both commas and semicolons: `{text}`")]
+    MixedSeparators { line: u64, text: String },
+    /// Compressed data that does not decode.
+    #[error("the compressed data is damaged at its byte {at}: {unpacked} of {expected} bytes unpacked")]
+    Damaged { at: usize, unpacked: usize, expected: usize },
+    /// The compressed block's size cannot be right.
+    #[error("the compressed block says {said} bytes unpacked, but the header's points take {expected}")]
+    UnpackedSize { said: u64, expected: u128 },
+    /// Nothing to build a map from.
+    #[error("no points: the file has {points}, of which {not_finite} are not finite")]
+    NoPoints { points: usize, not_finite: usize },
+    /// Coordinates that cannot be metres on a floor.
+    #[error("coordinates reach {value} m along {axis}: farther than {limit} m from the origin")]
+    FarAway { value: f64, axis: char, limit: f64 },
+    /// The grid would not fit in memory.
+    #[error("the grid would have {} x {} x {} cells of {resolution} m: more than can be handled", dims[0], dims[1], dims[2])]
+    TooLarge { dims: [u64; 3], resolution: f64, enough: f64 },
+    /// Not a cell size.
+    #[error("a resolution of {value} m cannot be used")]
+    Resolution { value: f64, at: Option<Span> },
+    /// The mission's resolution is not the grid's own.
+    #[error("the mission asks for cells of {asked} m, but the grid's own are {own} m")]
+    ResolutionDiffers { asked: f64, own: f64 },
+    /// Voxels of unknown size.
+    #[error("the voxels' size is not known: `.npy` has no place for it")]
+    NoResolution,
+    /// `origin_m` where it has no meaning.
+    #[error("`origin_m` is for voxel grids (.npy, 3-D): this map has its own coordinates")]
+    OriginUnused,
+    /// An origin that cannot be used.
+    #[error("the origin {value:?} is not finite or farther than {limit} m")]
+    Origin { value: Vec<f64>, limit: f64, at: Option<Span> },
+    /// A box or bounds upside down, thinner than a cell, or not finite.
+    #[error("a box from {:?} to {:?} is upside down, too thin for a grid, or farther than {limit} m", &corners[..3], &corners[3..])]
+    Box { corners: Vec<f64>, limit: f64 },
+    /// The slab is upside down or not finite.
+    #[error("height_m [{low}, {high}] is not a slab")]
+    Slab { low: f64, high: f64 },
+    /// NPY header that is not understood.
+    #[error("the .npy header is not understood: {fault}")]
+    NpyHeader { fault: &'static str },
+    /// A type that has no meaning here.
+    #[error("the array is of type `{descr}`: expected {expected}")]
+    NpyType { descr: String, expected: &'static str },
+    /// A shape that has no meaning here.
+    #[error("the array has shape {shape:?}: expected points N x 3 or voxels [ix, iy, iz]")]
+    NpyShape { shape: Vec<u64> },
+    /// JSON or YAML beside or instead of the map.
+    #[error("cannot read the map's {what}: {fault}")]
+    Description { what: &'static str, fault: String, at: Option<Span> },
+    /// `mode: scale` or `raw`.
+    #[error("map mode `{mode}` is not read: only `trinary`")]
+    Mode { mode: String, at: Span },
+    /// A turned image.
+    #[error("the map's origin is turned by {yaw} rad: only unturned maps are read")]
+    Turned { yaw: f64, at: Span },
+    /// The image is not there.
+    #[error("the image `{image}`, which the map names, is missing")]
+    NoImage { image: String, at: Span },
+    /// The image is no PGM.
+    #[error("the map's image is {found}, not a PGM (P5 or P2)")]
+    NotPgm { found: &'static str },
+    /// PGM header that is not understood.
+    #[error("the PGM header is not understood: expected {expected}, found `{found}`")]
+    PgmHeader { expected: &'static str, found: String },
+    /// A pixel lighter than white.
+    #[error("pixel {index} is {value}, above the image's own maximum {max}")]
+    Pixel { index: usize, value: u64, max: u32 },
+}
+
+impl Describe for MapError {
+    fn diagnostic(&self) -> Diagnostic {
+        use MapError::*;
+        let d = Diagnostic::error(self.code(), self);
+        match self {
+            Format { ending } => match ending.as_str() {
+                ".bt" | ".ot" => d.hint(format!("export the occupied leaves' centres as .pcd or .xyz; read are {FORMATS}")),
+                ".las" | ".laz" => d.hint(format!("convert it, e.g. `pdal translate map{ending} map.ply`; read are {FORMATS}")),
+                _ => d.hint(format!("read are {FORMATS}")),
+            },
+            UnknownHeaderLine { nearest, at, .. } => match nearest {
+                Some(near) => d.at(at).hint(format!("did you mean `{near}`?")),
+                None => d.at(at),
+            },
+            HeaderTwice { at, .. } | HeaderValue { at, .. } | HeaderLength { at, .. } | PointsDiffer { at, .. } => d.at(at),
+            NoCoordinate { at, .. } => {
+                d.maybe_at(at.as_ref()).hint("coordinates are called x, y, z (in tables also x_m, y_m, z_m)")
+            }
+            Truncated { promised, have_bytes, promised_bytes, .. } => d
+                .hint("the file was cut off while it was written or copied, or its header lies; make it again")
+                .number("promised", *promised as f64)
+                .number("promised_bytes", *promised_bytes as f64)
+                .number("have_bytes", *have_bytes as f64),
+            Surplus { .. } | RowsDiffer { .. } => d.hint("the header lies, or the file was cut off; make it again"),
+            MixedSeparators { .. } => d.hint("write decimals with a point, columns with one kind of separator"),
+            NoPoints { points, not_finite } => {
+                d.number("points", *points as u64).number("not_finite", *not_finite as u64)
+            }
+            FarAway { .. } => d.hint("metres are expected; of a georeferenced cloud subtract the offset first"),
+            TooLarge { enough, .. } => d.hint(format!("resolution_m: {enough} would do, or cut the map to what is driven on")),
+            Resolution { at, .. } => d.maybe_at(at.as_ref()).hint("metres per cell, such as 0.05"),
+            ResolutionDiffers { own, .. } => d.hint(format!("leave `resolution_m` out, or write {own}")),
+            NoResolution => d.hint(
+                "write `resolution_m` (and `origin_m`) in the mission's `map:`, or {\"resolution\": 0.05, \"origin\": [x, y, z]} \
+                 in a .json of the same name beside it",
+            ),
+            Origin { at, .. } | Description { at, .. } => d.maybe_at(at.as_ref()),
+            NpyType { expected: "booleans or integers", .. } => d.hint("threshold it first: numpy.save(file, grid > 0.5)"),
+            NpyShape { shape } if shape.first() == Some(&3) => d.hint("it looks transposed: save points.T"),
+            Mode { at, .. } => d.at(at).hint("with `mode: trinary` the two thresholds decide"),
+            Turned { at, .. } => d.at(at).hint("turn the image, or the poses, and set the origin's third number to 0"),
+            NoImage { at, .. } => d.at(at).hint("the path is relative to the .yaml"),
+            NotPgm { .. } => d.hint("convert it, e.g. `magick map.png map.pgm`, and name that in the .yaml"),
+            _ => d,
+        }
+    }
+}
+
+impl MapError {
+    fn code(&self) -> &'static str {
+        use MapError::*;
+        match self {
+            Format { .. } | ImageAlone | NotThisFormat { .. } | NotPgm { .. } => "map/format",
+            NoHeaderEnd { .. }
+            | UnknownHeaderLine { .. }
+            | HeaderTwice { .. }
+            | HeaderMissing { .. }
+            | HeaderValue { .. }
+            | HeaderLength { .. }
+            | PointsDiffer { .. }
+            | NpyHeader { .. }
+            | PgmHeader { .. }
+            | UnpackedSize { .. } => "map/header",
+            NoCoordinate { .. } => "map/no-coordinate",
+            Truncated { .. } => "map/truncated",
+            Surplus { .. } => "map/surplus",
+            RowsDiffer { promised, have, .. } if have < promised => "map/truncated",
+            RowsDiffer { .. } => "map/surplus",
+            Columns { .. } | NotANumber { .. } | MixedSeparators { .. } => "map/row",
+            Damaged { .. } => "map/damaged",
+            NoPoints { .. } => "map/no-points",
+            FarAway { .. } => "map/far-away",
+            TooLarge { .. } => "map/too-large",
+            Resolution { .. } | NoResolution => "map/resolution",
+            ResolutionDiffers { .. } => "map/resolution-differs",
+            OriginUnused | Origin { .. } => "map/origin",
+            Slab { .. } => "map/height",
+            Box { .. } => "map/box",
+            NpyType { .. } => "map/type",
+            NpyShape { .. } => "map/shape",
+            Description { .. } => "map/description",
+            Mode { .. } => "map/mode",
+            Turned { .. } => "map/turned",
+            NoImage { .. } => "map/no-image",
+            Pixel { .. } => "map/pixel",
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! map_server: a YAML sheet and a grey image, seen from above.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use serde::Deserialize;
+use serde_saphyr::Spanned;
+
+use super::error::MapError;
+use super::{FARTHEST, pgm, voxelize};
+use super::{VoxelMap, voxelize::Slab};
+use crate::diag::{Source, Span};
+use crate::mission::Unknown;
+
+/// Columns need not be higher than this, m, whatever `height_m` says: no robot is.
+const TALLEST: f64 = 10.0;
+
+/// map_server's YAML as written; keys of other tools are ignored.
+#[derive(Deserialize)]
+struct Written {
+    image: Spanned<String>,
+    resolution: Spanned<f64>,
+    origin: Spanned<Vec<f64>>,
+    negate: Option<Flag>,
+    occupied_thresh: Option<Spanned<f64>>,
+    free_thresh: Option<Spanned<f64>>,
+    mode: Option<Spanned<String>>,
+}
+
+/// map_server writes 0 or 1, people also false or true.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Flag {
+    Bool(bool),
+    Number(f64),
+}
+
+/// The sheet, checked.
+pub(super) struct Sheet {
+    image: String,
+    image_at: Span,
+    pub(super) resolution: f64,
+    origin: [f64; 2],
+    negate: bool,
+    occupied: f64,
+    free: f64,
+}
+
+/// The image's path, joined to the sheet's folder.
+pub(super) fn image(name: &str, bytes: &[u8]) -> Result<PathBuf, Vec<MapError>> {
+    let sheet = sheet(name, bytes)?;
+    Ok(std::path::Path::new(name).parent().unwrap_or(std::path::Path::new("")).join(sheet.image))
+}
+
+/// Reads the YAML.
+pub(super) fn sheet(name: &str, bytes: &[u8]) -> Result<Sheet, Vec<MapError>> {
+    let description = |fault: String, at| vec![MapError::Description { what: "YAML", fault, at }];
+    let text =
+        std::str::from_utf8(bytes).map_err(|e| description(format!("no text after byte {}", e.valid_up_to()), None))?;
+    let source = Arc::new(Source { name: name.to_owned(), text: text.to_owned() });
+    let written: Written = serde_saphyr::from_str(text).map_err(|error| {
+        let at = error.location().map(|l| span(&source, l));
+        // The first line says what is wrong; the rest would quote the text once more.
+        let fault = error.without_snippet().to_string().lines().next().unwrap_or("not YAML").to_owned();
+        description(fault, at)
+    })?;
+    let mut faults = Vec::new();
+    let resolution = written.resolution.value;
+    if !voxelize::usable(resolution) {
+        let at = Some(span(&source, written.resolution.referenced));
+        faults.push(MapError::Resolution { value: resolution, at });
+    }
+    let origin = &written.origin.value;
+    let origin_at = span(&source, written.origin.referenced);
+    let usable = |v: &f64| v.abs() <= FARTHEST; // false for NaN
+    if !(2..=3).contains(&origin.len()) || !origin.iter().all(usable) {
+        faults.push(MapError::Origin { value: origin.clone(), limit: FARTHEST, at: Some(origin_at) });
+    } else if let Some(yaw) = origin.get(2).filter(|yaw| yaw.abs() > 1e-9) {
+        faults.push(MapError::Turned { yaw: *yaw, at: origin_at });
+    }
+    for (threshold, name) in [(&written.occupied_thresh, "occupied_thresh"), (&written.free_thresh, "free_thresh")] {
+        if let Some(threshold) = threshold.as_ref().filter(|t| !(0.0..=1.0).contains(&t.value)) {
+            let (word, value) = (name.to_owned(), threshold.value.to_string());
+            let at = span(&source, threshold.referenced);
+            faults.push(MapError::HeaderValue { word, value, expected: "a number from 0 to 1", at });
+        }
+    }
+    if let Some(mode) = written.mode.as_ref().filter(|m| m.value != "trinary") {
+        faults.push(MapError::Mode { mode: mode.value.clone(), at: span(&source, mode.referenced) });
+    }
+    if !faults.is_empty() {
+        return Err(faults);
+    }
+    Ok(Sheet {
+        image_at: span(&source, written.image.referenced),
+        image: written.image.value,
+        resolution,
+        origin: [origin[0], origin[1]],
+        negate: written.negate.is_some_and(|flag| match flag {
+            Flag::Bool(flag) => flag,
+            Flag::Number(number) => number != 0.0,
+        }),
+        occupied: written.occupied_thresh.map_or(0.65, |t| t.value),
+        free: written.free_thresh.map_or(0.196, |t| t.value),
+    })
+}
+
+/// The place of a value in the text.
+fn span(source: &Arc<Source>, location: serde_saphyr::Location) -> Span {
+    let (line, column) = (location.line().saturating_sub(1) as usize, location.column().saturating_sub(1) as usize);
+    let start = source.text.split_inclusive('\n').take(line).map(str::len).sum::<usize>();
+    let rest = &source.text[start..];
+    let begin: usize = rest.chars().take(column).map(char::len_utf8).sum();
+    let length = rest[begin..].find('\n').unwrap_or(rest.len() - begin);
+    let shown = rest[begin..begin + length].trim_end().len();
+    Span::new(source, start + begin..start + begin + shown)
+}
+
+/// What a pixel says.
+#[derive(Clone, Copy, PartialEq)]
+enum Seen {
+    Free,
+    Unknown,
+    Occupied,
+}
+
+/// Makes columns of the image's occupied pixels, from the floor to the slab's upper end.
+pub(super) fn voxels(sheet: &Sheet, image: Option<&[u8]>, slab: Slab, unknown: Unknown) -> Result<VoxelMap, MapError> {
+    let missing = || MapError::NoImage { image: sheet.image.clone(), at: sheet.image_at.clone() };
+    let image = pgm::read(image.ok_or_else(missing)?)?;
+    let bottom = slab.low.min(0.0);
+    let top = slab.high.min(TALLEST).max(bottom);
+    // Cells that reach `top`; a hair above a whole number of cells is rounding.
+    let layers = ((top - bottom) / sheet.resolution - 1e-9).ceil().max(1.0);
+    let size = voxelize::checked([image.width as i64, image.height as i64, layers as i64], sheet.resolution)?;
+    let origin = [sheet.origin[0], sheet.origin[1], bottom];
+    let mut map = VoxelMap::new(sheet.resolution, origin, size, unknown);
+    let max = f64::from(image.max);
+    let meaning: Vec<Seen> = (0..=image.max)
+        .map(|value| {
+            let light = f64::from(value) / max;
+            let filled = if sheet.negate { light } else { 1.0 - light };
+            match (filled > sheet.occupied, filled < sheet.free) {
+                (true, _) => Seen::Occupied,
+                (_, true) => Seen::Free,
+                _ => Seen::Unknown,
+            }
+        })
+        .collect();
+    for (row, pixels) in image.pixels.chunks_exact(image.width).enumerate() {
+        let j = image.height - 1 - row; // the top row is the largest y
+        for (i, pixel) in pixels.iter().enumerate() {
+            let seen = meaning[usize::from(*pixel)];
+            let only_unknown = seen == Seen::Unknown && unknown == Unknown::Occupied;
+            if only_unknown {
+                map.statistics.unknown += size[2];
+            }
+            if only_unknown || seen == Seen::Occupied {
+                map.occupy_column(i, j);
+            }
+        }
+    }
+    Ok(map)
+}

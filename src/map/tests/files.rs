@@ -1,0 +1,1 @@
+//! The maps shipped with the crate.
