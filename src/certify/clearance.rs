@@ -362,7 +362,7 @@ impl<'a> Search<'a> {
                 ),
             };
             let message = if *distance <= 0.0 {
-                format!("`{link}` is {:.4} m deep in {what} at t = {time:.3} s", -distance)
+                format!("`{link}` is about {:.3} m deep in {what} at t = {time:.3} s", -distance)
             } else if *distance < required {
                 format!("`{link}` comes within {distance:.4} m of {what} at t = {time:.3} s; {required:.4} m required")
             } else {

@@ -224,3 +224,75 @@ fn greatest(shape: &Shape, turn: &Matrix3<f64>, at: &Vector3<f64>, of: impl Fn(V
     };
     corners.into_iter().map(|corner| of(turn * corner + at)).fold(0.0, f64::max)
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::certify::rollout::Rollout;
+    use crate::certify::tests::robots::{any_motion, any_robot, commands, cut};
+
+    proptest! {
+        #[test]
+        fn no_shape_reaches_farther_than_its_bound(
+            robot in any_robot(), (start, values, step, held) in any_motion(), part in 0.01..1.0f64,
+            normal in [-1.0..1.0, -1.0..1.0, 0.1..1.0f64],
+        ) {
+            let (values, held) = cut(&robot, &values, &held);
+            let (table, _) = commands(&robot, start, &values, step, &held);
+            let rollout = Rollout::new(&table, start, &values);
+            let kinematics = Kinematics::new(&robot);
+            let normal = Vector3::from(normal).normalize();
+            let (mut joints, mut bodies) = (Vec::new(), Vec::new());
+            for row in 0..held.len() {
+                let half = 0.5 * step * part;
+                let mut at = |shape: usize, tau: f64| {
+                    rollout.extreme_joints(row, &mut joints);
+                    let acceleration = kinematics.acceleration(shape, rollout.held(row), &joints);
+                    rollout.joints_at(row, tau, &mut joints);
+                    kinematics.bodies(&joints, rollout.held(row), &mut bodies);
+                    let moving = kinematics.shape(shape, &bodies, rollout.pose(row, tau), acceleration);
+                    let pose = rollout.pose(row, tau).isometry() * robot.shape_poses(&joints)[shape];
+                    assert!((pose.translation.vector - moving.posed.centre).norm() < 1e-12);
+                    assert!((pose.rotation.to_rotation_matrix().into_inner() - moving.posed.turn).norm() < 1e-12);
+                    moving
+                };
+                for shape in 0..robot.shapes.len() {
+                    let middle = at(shape, 0.5 * step);
+                    let bounds = middle.reach(&normal, half);
+                    for sample in -8..=8 {
+                        let moved = at(shape, 0.5 * step + half * f64::from(sample) / 8.0).posed;
+                        let shift = moved.centre - middle.posed.centre;
+                        let reach = normal.dot(&shift) + moved.reach(&normal);
+                        let bound = bounds[usize::from(sample > 0)];
+                        prop_assert!(reach <= bound + 1e-12, "{reach} > {bound}");
+                        prop_assert!((moved.turn - middle.posed.turn).norm() < 1e-12 || shift.norm() <= middle.motion(half) + 1e-12);
+                        prop_assert!(shift.norm() <= middle.motion(half) + 1e-12);
+                    }
+                }
+            }
+        }
+
+        #[test]
+        fn velocities_are_the_derivatives_of_poses(robot in any_robot(), (start, values, _, held) in any_motion()) {
+            let (values, held) = cut(&robot, &values, &held[..1]);
+            let (table, _) = commands(&robot, start, &values, 1.0, &held);
+            let rollout = Rollout::new(&table, start, &values);
+            let kinematics = Kinematics::new(&robot);
+            let at = |shape: usize, tau: f64| {
+                let (mut joints, mut bodies) = (Vec::new(), Vec::new());
+                rollout.joints_at(0, tau, &mut joints);
+                kinematics.bodies(&joints, rollout.held(0), &mut bodies);
+                kinematics.shape(shape, &bodies, rollout.pose(0, tau), 0.0)
+            };
+            for shape in 0..robot.shapes.len() {
+                let (before, now, after) = (at(shape, 0.5 - 1e-5), at(shape, 0.5), at(shape, 0.5 + 1e-5));
+                let velocity = (after.posed.centre - before.posed.centre) / 2e-5;
+                prop_assert!((velocity - now.velocity).norm() < 1e-7);
+                let turning = (after.posed.turn - before.posed.turn) / 2e-5;
+                prop_assert!((turning - now.spin.cross_matrix() * now.posed.turn).norm() < 1e-7);
+            }
+        }
+    }
+}
