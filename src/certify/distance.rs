@@ -1,0 +1,287 @@
+//! Distance of a posed convex shape and an axis-aligned box, with a proof: a plane that separates them by at least as much.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::simplex::Simplex;
+use crate::geom::Aabb;
+use crate::robot::Convex;
+
+/// Distances up to this count as touching, m.
+const TOUCHING: f64 = 1e-9;
+/// The search for the distance ends when its upper and lower bound are this near, m.
+const GAP: f64 = 1e-7;
+/// Corners tried before the bounds are returned as they are. Polytopes need about ten, cylinders up to thirty.
+const CORNERS: usize = 64;
+
+/// A convex shape somewhere.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Posed<'a> {
+    /// About its own centre.
+    pub(super) convex: &'a Convex,
+    /// map <- shape.
+    pub(super) turn: Matrix3<f64>,
+    /// The shape's centre in the map frame, m.
+    pub(super) centre: Vector3<f64>,
+}
+
+/// What is known of a distance, in metres.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Separation {
+    /// Distance of two points, one in each body. Zero: they meet.
+    pub(super) upper: f64,
+    /// Unit vector from the shape to the box across which they are farthest apart; `None` where they meet.
+    pub(super) normal: Option<Vector3<f64>>,
+}
+
+impl Posed<'_> {
+    /// How far the shape reaches from its centre along `d`: the greatest `d . (p - centre)` over its points p, times |d|.
+    pub(super) fn reach(&self, d: &Vector3<f64>) -> f64 {
+        let local = self.turn.tr_mul(d);
+        match self.convex {
+            Convex::Box { half } => half[0] * local.x.abs() + half[1] * local.y.abs() + half[2] * local.z.abs(),
+            Convex::Cylinder { radius, half_length } => {
+                radius * (local.x * local.x + local.y * local.y).sqrt() + half_length * local.z.abs()
+            }
+            Convex::Sphere { radius } => radius * local.norm(),
+            Convex::Hull { vertices } => {
+                let heights = vertices.iter().map(|v| v[0] * local.x + v[1] * local.y + v[2] * local.z);
+                heights.fold(f64::NEG_INFINITY, f64::max)
+            }
+        }
+    }
+
+    /// The shape's bounding box in the map frame.
+    pub(super) fn bounds(&self) -> Aabb {
+        let (mut min, mut max) = ([0.0; 3], [0.0; 3]);
+        for axis in 0..3 {
+            let unit = Vector3::ith(axis, 1.0);
+            max[axis] = self.centre[axis] + self.reach(&unit);
+            min[axis] = match self.convex {
+                Convex::Hull { .. } => self.centre[axis] - self.reach(&-unit),
+                _ => 2.0 * self.centre[axis] - max[axis], // symmetric about the centre
+            };
+        }
+        Aabb { min, max }
+    }
+
+    /// How far apart the shape and the box are across planes with unit normal `normal` (from the shape to the box), m.
+    /// Negative where such a plane does not separate them. Never more than the distance but by rounding.
+    pub(super) fn slab(&self, normal: &Vector3<f64>, obstacle: &Aabb) -> f64 {
+        nearest_along(normal, obstacle, &self.centre) - self.reach(normal)
+    }
+
+    /// The distance to a box, by Gilbert, Johnson and Keerthi's descent over the difference of the two bodies.
+    pub(super) fn separation(&self, obstacle: &Aabb) -> Separation {
+        // Points of the difference, seen from the box: shape minus box, in axes of the map, about the shape's centre.
+        let corner = |away: &Vector3<f64>| {
+            let shape = self.turn * self.convex.support(&self.turn.tr_mul(away));
+            let mut corner = shape + self.centre;
+            for axis in 0..3 {
+                corner[axis] -= if away[axis] < 0.0 { obstacle.max[axis] } else { obstacle.min[axis] };
+            }
+            corner
+        };
+        let mut toward = Vector3::zeros();
+        for axis in 0..3 {
+            toward[axis] = self.centre[axis].clamp(obstacle.min[axis], obstacle.max[axis]) - self.centre[axis];
+        }
+        if toward.norm_squared() == 0.0 {
+            toward = Vector3::z();
+        }
+        let mut simplex = Simplex::new(corner(&toward));
+        let mut best = Separation { upper: f64::INFINITY, normal: None };
+        let mut lower = f64::NEG_INFINITY;
+        for _ in 0..CORNERS {
+            let Some(nearest) = simplex.reduce() else {
+                return Separation { upper: 0.0, normal: None };
+            };
+            let distance = nearest.norm();
+            if distance <= TOUCHING {
+                return Separation { upper: 0.0, normal: None };
+            }
+            let stalled = distance >= best.upper;
+            best.upper = best.upper.min(distance);
+            let normal = nearest / -distance;
+            let next = corner(&normal);
+            let slab = -normal.dot(&next);
+            if slab > lower {
+                (lower, best.normal) = (slab, Some(normal));
+            }
+            if best.upper - lower <= GAP || stalled || simplex.has(&next) {
+                break;
+            }
+            simplex.push(next);
+        }
+        best
+    }
+
+    /// How far the shape must move, at most, to leave a box that it overlaps, m: the least overlap across the faces of both
+    /// and across their edges.
+    pub(super) fn depth(&self, obstacle: &Aabb) -> f64 {
+        let own =
+            [self.turn.column(0).into_owned(), self.turn.column(1).into_owned(), self.turn.column(2).into_owned()];
+        let map = [Vector3::x(), Vector3::y(), Vector3::z()];
+        let edges = own.iter().flat_map(|a| map.iter().filter_map(move |b| a.cross(b).try_normalize(1e-6)));
+        let normals: Vec<_> = own.iter().chain(&map).copied().chain(edges).collect();
+        let both_sides = normals.iter().flat_map(|n| [*n, -n]);
+        both_sides.map(|n| -self.slab(&n, obstacle)).fold(f64::INFINITY, f64::min).max(0.0)
+    }
+}
+
+/// The least `normal . (b - from)` over the points b of a box.
+pub(super) fn nearest_along(normal: &Vector3<f64>, obstacle: &Aabb, from: &Vector3<f64>) -> f64 {
+    (0..3)
+        .map(|axis| {
+            let corner = if normal[axis] < 0.0 { obstacle.max[axis] } else { obstacle.min[axis] };
+            normal[axis] * (corner - from[axis])
+        })
+        .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::{Isometry3, UnitQuaternion};
+    use parry3d_f64::math::{Pose, Vector};
+    use parry3d_f64::query;
+    use parry3d_f64::shape::{Ball, ConvexPolyhedron, Cuboid, Cylinder, SharedShape};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn posed<'a>(convex: &'a Convex, pose: &Isometry3<f64>) -> Posed<'a> {
+        let turn = pose.rotation.to_rotation_matrix().into_inner();
+        Posed { convex, turn, centre: pose.translation.vector }
+    }
+
+    fn any_pose() -> impl Strategy<Value = Isometry3<f64>> {
+        ([-1.5..1.5, -1.5..1.5, -1.5..1.5f64], [-3.0..3.0, -3.0..3.0, -3.0..3.0f64])
+            .prop_map(|(t, r)| Isometry3::new(Vector3::from(t), Vector3::from(r)))
+    }
+
+    fn any_convex() -> impl Strategy<Value = Convex> {
+        let size = || 0.02..0.6f64;
+        prop_oneof![
+            [size(), size(), size()].prop_map(|half| Convex::Box { half }),
+            (size(), size()).prop_map(|(radius, half_length)| Convex::Cylinder { radius, half_length }),
+            size().prop_map(|radius| Convex::Sphere { radius }),
+            prop::collection::vec([-0.6..0.6, -0.6..0.6, -0.6..0.6f64], 5..20)
+                .prop_map(|vertices| Convex::Hull { vertices }),
+        ]
+    }
+
+    fn any_box() -> impl Strategy<Value = Aabb> {
+        ([-1.0..1.0, -1.0..1.0, -1.0..1.0f64], [0.01..0.8, 0.01..0.8, 0.01..0.8f64])
+            .prop_map(|(min, size)| Aabb { min, max: std::array::from_fn(|i| min[i] + size[i]) })
+    }
+
+    /// The same bodies in another library (its cylinders have their axis along y).
+    fn peer(convex: &Convex) -> Option<(SharedShape, UnitQuaternion<f64>)> {
+        let straight = UnitQuaternion::identity();
+        Some(match convex {
+            Convex::Box { half } => {
+                (SharedShape(Arc::new(Cuboid::new(Vector::new(half[0], half[1], half[2])))), straight)
+            }
+            Convex::Cylinder { radius, half_length } => (
+                SharedShape(Arc::new(Cylinder::new(*half_length, *radius))),
+                UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2),
+            ),
+            Convex::Sphere { radius } => (SharedShape(Arc::new(Ball::new(*radius))), straight),
+            Convex::Hull { vertices } => {
+                let points: Vec<_> = vertices.iter().map(|v| Vector::new(v[0], v[1], v[2])).collect();
+                (SharedShape(Arc::new(ConvexPolyhedron::from_convex_hull(&points)?)), straight)
+            }
+        })
+    }
+
+    fn peer_pose(pose: &Isometry3<f64>) -> Pose {
+        let (t, r) = (pose.translation.vector, pose.rotation.scaled_axis());
+        Pose::new(Vector::new(t.x, t.y, t.z), Vector::new(r.x, r.y, r.z))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+
+        #[test]
+        fn both_bounds_of_the_distance_meet(convex in any_convex(), pose in any_pose(), obstacle in any_box()) {
+            let shape = posed(&convex, &pose);
+            let found = shape.separation(&obstacle);
+            match found.normal {
+                Some(normal) => {
+                    prop_assert!((normal.norm() - 1.0).abs() < 1e-14);
+                    let lower = shape.slab(&normal, &obstacle);
+                    prop_assert!(lower <= found.upper + 1e-13);
+                    prop_assert!(found.upper - lower <= 1.01e-7, "{} {lower}", found.upper);
+                }
+                None => prop_assert_eq!(found.upper, 0.0),
+            }
+        }
+
+        #[test]
+        fn the_distance_is_that_of_another_library(convex in any_convex(), pose in any_pose(), obstacle in any_box()) {
+            let Some((other, turned)) = peer(&convex) else { return Ok(()) };
+            let half: [f64; 3] = std::array::from_fn(|i| 0.5 * (obstacle.max[i] - obstacle.min[i]));
+            let cuboid = Cuboid::new(Vector::new(half[0], half[1], half[2]));
+            let middle = Isometry3::translation(
+                obstacle.min[0] + half[0], obstacle.min[1] + half[1], obstacle.min[2] + half[2]);
+            let expected = query::distance(&peer_pose(&(pose * turned)), &*other.0, &peer_pose(&middle), &cuboid);
+            let found = posed(&convex, &pose).separation(&obstacle).upper;
+            prop_assert!((found - expected.unwrap().distance).abs() < 1e-5, "{found} {expected:?}");
+        }
+    }
+
+    #[test]
+    fn the_depth_is_the_shortest_way_out() {
+        let obstacle = Aabb { min: [0.0; 3], max: [1.0; 3] };
+        for (convex, depth) in [
+            (Convex::Box { half: [0.2, 0.3, 0.3] }, 0.3),
+            (Convex::Sphere { radius: 0.3 }, 0.4),
+            (Convex::Cylinder { radius: 0.2, half_length: 0.4 }, 0.3),
+        ] {
+            let shape = posed(&convex, &Isometry3::translation(0.1, 0.5, 0.5));
+            assert!((shape.depth(&obstacle) - depth).abs() < 1e-12, "{convex:?} {}", shape.depth(&obstacle));
+        }
+    }
+
+    #[test]
+    fn a_shape_inside_a_box_and_a_box_inside_a_shape_meet() {
+        let large = Aabb { min: [-5.0; 3], max: [5.0; 3] };
+        let small = Aabb { min: [0.01; 3], max: [0.02; 3] };
+        for convex in [
+            Convex::Box { half: [0.3; 3] },
+            Convex::Sphere { radius: 0.3 },
+            Convex::Cylinder { radius: 0.3, half_length: 0.2 },
+        ] {
+            let shape = posed(&convex, &Isometry3::rotation(Vector3::new(0.3, 0.2, 0.1)));
+            assert_eq!(shape.separation(&large).upper, 0.0);
+            assert_eq!(shape.separation(&small).upper, 0.0);
+        }
+    }
+
+    #[test]
+    fn parallel_faces_and_corners_have_the_distance_of_the_closed_form() {
+        let obstacle = Aabb { min: [1.0, -1.0, -1.0], max: [2.0, 1.0, 1.0] };
+        let cases = [
+            (Convex::Box { half: [0.5; 3] }, [0.0, 0.0, 0.0], 0.5),
+            (Convex::Box { half: [0.5; 3] }, [0.0, 2.0, 2.0], (0.25 + 0.25 + 0.25f64).sqrt()),
+            (Convex::Cylinder { radius: 0.5, half_length: 0.1 }, [0.0, 0.0, 0.0], 0.5),
+            (Convex::Cylinder { radius: 0.5, half_length: 0.1 }, [1.5, 0.0, 1.4], 0.3),
+            (Convex::Sphere { radius: 0.2 }, [0.0, 2.0, 2.0], 3.0f64.sqrt() - 0.2),
+        ];
+        for (convex, centre, expected) in cases {
+            let shape = posed(&convex, &Isometry3::translation(centre[0], centre[1], centre[2]));
+            let found = shape.separation(&obstacle);
+            let lower = shape.slab(&found.normal.unwrap(), &obstacle);
+            assert!((found.upper - expected).abs() < 1e-7 && (lower - expected).abs() < 1e-7, "{convex:?} {found:?}");
+        }
+    }
+
+    #[test]
+    fn the_bounding_box_holds_the_shape_tightly() {
+        let convex =
+            Convex::Hull { vertices: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]] };
+        let bounds = posed(&convex, &Isometry3::translation(10.0, 0.0, 0.0)).bounds();
+        assert_eq!((bounds.min, bounds.max), ([10.0, 0.0, 0.0], [11.0, 2.0, 3.0]));
+    }
+}

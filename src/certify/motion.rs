@@ -1,0 +1,298 @@
+//! Where the shapes are, how fast they move, and how far they can get from there: the bounds that turn an instant's distance
+//! into a distance over an interval.
+//!
+//! While a row is held, the base has a constant twist and every joint a constant rate. A point p of the robot then obeys
+//! `n . p(t + tau) <= n . p + tau n . p' + A tau^2 / 2` for any unit n, with A a bound on |p''| over the row. The first-order
+//! term is linear in p, so its greatest value over a whole shape is that of a support function, not an estimate.
+
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+use super::distance::Posed;
+use crate::geom::Pose2;
+use crate::robot::{Convex, RobotModel, Shape};
+
+/// What the commands hold during a row.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Held<'a> {
+    /// Of the base, m/s.
+    pub(super) speed: f64,
+    /// Of the base, rad/s.
+    pub(super) turn_rate: f64,
+    /// Of the moving joints, rad/s or m/s.
+    pub(super) rates: &'a [f64],
+}
+
+/// A rigid body at an instant: its pose and velocity in the base frame (the base's own motion included).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Moving {
+    turn: Matrix3<f64>,
+    at: Vector3<f64>,
+    /// rad/s.
+    spin: Vector3<f64>,
+    /// Of the body's point that is at the base frame's origin, m/s.
+    drift: Vector3<f64>,
+}
+
+/// A shape at an instant, in the map frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MovingShape<'a> {
+    /// Where it is.
+    pub(super) posed: Posed<'a>,
+    /// Velocity of its centre, m/s.
+    velocity: Vector3<f64>,
+    /// rad/s.
+    spin: Vector3<f64>,
+    /// A bound on the acceleration of its points while the row is held, m/s^2.
+    acceleration: f64,
+    /// Radius of the ball about the centre that holds the shape, m.
+    pub(super) radius: f64,
+}
+
+impl MovingShape<'_> {
+    /// No point gets farther than this from where it is within `half` seconds before or after, m.
+    pub(super) fn motion(&self, half: f64) -> f64 {
+        let fastest = self.velocity.norm() + self.spin.norm() * self.radius;
+        half * (fastest + 0.5 * half * self.acceleration)
+    }
+
+    /// How far the shape reaches along the unit vector `normal` from where its centre is now, at any instant up to `half`
+    /// seconds before (first) and after (second); at least, in m.
+    pub(super) fn reach(&self, normal: &Vector3<f64>, half: f64) -> [f64; 2] {
+        let (shift, turned) = (half * normal.dot(&self.velocity), normal.cross(&self.spin) * half);
+        let bend = 0.5 * half * half * self.acceleration;
+        let now = self.posed.reach(normal);
+        let at = |sign: f64| (sign * shift + self.posed.reach(&(normal + turned * sign)) + bend).max(now);
+        [at(-1.0), at(1.0)]
+    }
+}
+
+/// The robot's geometry prepared for evaluation.
+#[derive(Debug)]
+pub(super) struct Kinematics<'a> {
+    robot: &'a RobotModel,
+    bodies: Vec<(Matrix3<f64>, Vector3<f64>)>,
+    shapes: Vec<ShapeFacts>,
+}
+
+#[derive(Debug)]
+struct ShapeFacts {
+    turn: Matrix3<f64>,
+    at: Vector3<f64>,
+    radius: f64,
+    /// Greatest distance of a point from the axis of the body's own joint (body 0: from the base's vertical axis).
+    lever: f64,
+    /// Greatest distance of a point from the body's origin.
+    reach: f64,
+}
+
+impl<'a> Kinematics<'a> {
+    /// Prepares a robot.
+    pub(super) fn new(robot: &'a RobotModel) -> Self {
+        let matrix = |pose: &nalgebra::Isometry3<f64>| {
+            (pose.rotation.to_rotation_matrix().into_inner(), pose.translation.vector)
+        };
+        let bodies: Vec<_> = robot.bodies.iter().map(|b| matrix(&b.origin)).collect();
+        let shapes = robot.shapes.iter().map(|shape| {
+            let (turn, at) = matrix(&shape.pose);
+            let radius = shape.convex.bounding_radius();
+            let (lever, reach) = match &robot.bodies[shape.body].motion {
+                Some(motion) => (
+                    greatest(shape, &turn, &at, |p| p.cross(&motion.axis).norm()),
+                    greatest(shape, &turn, &at, |p| p.norm()),
+                ),
+                None => {
+                    let (body_turn, body_at) = bodies[shape.body];
+                    let planar = |p: Vector3<f64>| (body_turn * p + body_at).xy().norm();
+                    (greatest(shape, &turn, &at, planar), greatest(shape, &turn, &at, |p| p.norm()))
+                }
+            };
+            ShapeFacts { turn, at, radius, lever, reach }
+        });
+        let shapes = shapes.collect();
+        Self { robot, bodies, shapes }
+    }
+
+    /// Poses and velocities of all bodies at joint values `joints`; `out` is cleared first.
+    pub(super) fn bodies(&self, joints: &[f64], held: Held<'_>, out: &mut Vec<Moving>) {
+        out.clear();
+        for (body, (turn, at)) in self.robot.bodies.iter().zip(&self.bodies) {
+            let Some(motion) = &body.motion else {
+                let (spin, drift) = (Vector3::new(0.0, 0.0, held.turn_rate), Vector3::new(held.speed, 0.0, 0.0));
+                out.push(Moving { turn: *turn, at: *at, spin, drift });
+                continue;
+            };
+            let parent = out[body.parent];
+            let value = motion.multiplier * joints[motion.joint] + motion.offset;
+            let rate = motion.multiplier * held.rates[motion.joint];
+            let mut moved = Moving {
+                turn: parent.turn * turn,
+                at: parent.turn * at + parent.at,
+                spin: parent.spin,
+                drift: parent.drift,
+            };
+            let axis = moved.turn * motion.axis.into_inner();
+            if motion.prismatic {
+                moved.at += axis * value;
+                moved.drift += axis * rate;
+            } else {
+                moved.turn *= Rotation3::from_axis_angle(&motion.axis, value).into_inner();
+                moved.spin += axis * rate;
+                moved.drift -= axis.cross(&moved.at) * rate;
+            }
+            out.push(moved);
+        }
+    }
+
+    /// A shape at the instant of `bodies`, with the base at `pose`.
+    pub(super) fn shape(&self, shape: usize, bodies: &[Moving], pose: Pose2, acceleration: f64) -> MovingShape<'a> {
+        let facts = &self.shapes[shape];
+        let body = &bodies[self.robot.shapes[shape].body];
+        let (sin, cos) = pose.yaw.sin_cos();
+        let map = Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0);
+        let centre = body.turn * facts.at + body.at;
+        MovingShape {
+            posed: Posed {
+                convex: &self.robot.shapes[shape].convex,
+                turn: map * body.turn * facts.turn,
+                centre: map * centre + Vector3::new(pose.x, pose.y, 0.0),
+            },
+            velocity: map * (body.drift + body.spin.cross(&centre)),
+            spin: map * body.spin,
+            acceleration,
+            radius: facts.radius,
+        }
+    }
+
+    /// A bound on |p''| of the points of a shape while a row is held, m/s^2. `extreme`: per joint, the greatest magnitude of
+    /// its value during the row.
+    ///
+    /// From the leaf to the base: a frame that turns at a constant rate w about an axis at distance r adds
+    /// `w^2 r` and `2 |w|` times the speed that the point already has in it.
+    pub(super) fn acceleration(&self, shape: usize, held: Held<'_>, extreme: &[f64]) -> f64 {
+        let facts = &self.shapes[shape];
+        let (mut lever, mut reach) = (facts.lever, facts.reach);
+        let (mut speed, mut acceleration) = (0.0, 0.0);
+        let mut index = self.robot.shapes[shape].body;
+        while let Some(motion) = &self.robot.bodies[index].motion {
+            let rate = (motion.multiplier * held.rates[motion.joint]).abs();
+            if motion.prismatic {
+                speed += rate;
+                reach += (motion.multiplier * extreme[motion.joint]).abs() + motion.offset.abs();
+            } else {
+                acceleration += rate * (2.0 * speed + rate * lever);
+                speed += rate * lever;
+            }
+            reach += self.bodies[index].1.norm();
+            lever = reach;
+            index = self.robot.bodies[index].parent;
+        }
+        if index != self.robot.shapes[shape].body {
+            lever = reach + self.bodies[index].1.norm();
+        }
+        let turn_rate = held.turn_rate.abs();
+        acceleration + turn_rate * (held.speed.abs() + turn_rate * lever + 2.0 * speed)
+    }
+
+    /// A bound on the distance of any point of the robot from the base frame's origin, m. `extreme`: as in `acceleration`, over
+    /// the whole motion.
+    pub(super) fn size(&self, extreme: &[f64]) -> f64 {
+        let bodies = self.robot.bodies.iter().map(|body| {
+            let slide = body.motion.as_ref().filter(|m| m.prismatic);
+            let slide = slide.map_or(0.0, |m| (m.multiplier * extreme[m.joint]).abs() + m.offset.abs());
+            body.origin.translation.vector.norm() + slide
+        });
+        let shapes = self.shapes.iter().map(|shape| shape.at.norm() + shape.radius);
+        bodies.sum::<f64>() + shapes.fold(0.0, f64::max)
+    }
+
+    /// Number of shapes.
+    pub(super) fn shape_count(&self) -> usize {
+        self.shapes.len()
+    }
+}
+
+/// The greatest value of a convex function over a shape posed in its body, or a bound on it: a convex function is greatest at
+/// a corner, so round shapes are replaced by boxes around them.
+fn greatest(shape: &Shape, turn: &Matrix3<f64>, at: &Vector3<f64>, of: impl Fn(Vector3<f64>) -> f64) -> f64 {
+    let corners: Vec<Vector3<f64>> = match &shape.convex {
+        Convex::Hull { vertices } => vertices.iter().map(|v| Vector3::from(*v)).collect(),
+        other => {
+            let half = other.half_extents();
+            let side = |bit: usize, axis: usize| if bit >> axis & 1 == 1 { half[axis] } else { -half[axis] };
+            (0..8).map(|bit| Vector3::new(side(bit, 0), side(bit, 1), side(bit, 2))).collect()
+        }
+    };
+    corners.into_iter().map(|corner| of(turn * corner + at)).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::certify::rollout::Rollout;
+    use crate::certify::tests::robots::{any_motion, any_robot, commands, cut};
+
+    proptest! {
+        #[test]
+        fn no_shape_reaches_farther_than_its_bound(
+            robot in any_robot(), (start, values, step, held) in any_motion(), part in 0.01..1.0f64,
+            normal in [-1.0..1.0, -1.0..1.0, 0.1..1.0f64],
+        ) {
+            let (values, held) = cut(&robot, &values, &held);
+            let (table, _) = commands(&robot, start, &values, step, &held);
+            let rollout = Rollout::new(&table, start, &values);
+            let kinematics = Kinematics::new(&robot);
+            let normal = Vector3::from(normal).normalize();
+            let (mut joints, mut bodies) = (Vec::new(), Vec::new());
+            for row in 0..held.len() {
+                let half = 0.5 * step * part;
+                let mut at = |shape: usize, tau: f64| {
+                    rollout.extreme_joints(row, &mut joints);
+                    let acceleration = kinematics.acceleration(shape, rollout.held(row), &joints);
+                    rollout.joints_at(row, tau, &mut joints);
+                    kinematics.bodies(&joints, rollout.held(row), &mut bodies);
+                    let moving = kinematics.shape(shape, &bodies, rollout.pose(row, tau), acceleration);
+                    let pose = rollout.pose(row, tau).isometry() * robot.shape_poses(&joints)[shape];
+                    assert!((pose.translation.vector - moving.posed.centre).norm() < 1e-12);
+                    assert!((pose.rotation.to_rotation_matrix().into_inner() - moving.posed.turn).norm() < 1e-12);
+                    moving
+                };
+                for shape in 0..robot.shapes.len() {
+                    let middle = at(shape, 0.5 * step);
+                    let bounds = middle.reach(&normal, half);
+                    for sample in -8..=8 {
+                        let moved = at(shape, 0.5 * step + half * f64::from(sample) / 8.0).posed;
+                        let shift = moved.centre - middle.posed.centre;
+                        let reach = normal.dot(&shift) + moved.reach(&normal);
+                        let bound = bounds[usize::from(sample > 0)];
+                        prop_assert!(reach <= bound + 1e-12, "{reach} > {bound}");
+                        prop_assert!((moved.turn - middle.posed.turn).norm() < 1e-12 || shift.norm() <= middle.motion(half) + 1e-12);
+                        prop_assert!(shift.norm() <= middle.motion(half) + 1e-12);
+                    }
+                }
+            }
+        }
+
+        #[test]
+        fn velocities_are_the_derivatives_of_poses(robot in any_robot(), (start, values, _, held) in any_motion()) {
+            let (values, held) = cut(&robot, &values, &held[..1]);
+            let (table, _) = commands(&robot, start, &values, 1.0, &held);
+            let rollout = Rollout::new(&table, start, &values);
+            let kinematics = Kinematics::new(&robot);
+            let at = |shape: usize, tau: f64| {
+                let (mut joints, mut bodies) = (Vec::new(), Vec::new());
+                rollout.joints_at(0, tau, &mut joints);
+                kinematics.bodies(&joints, rollout.held(0), &mut bodies);
+                kinematics.shape(shape, &bodies, rollout.pose(0, tau), 0.0)
+            };
+            for shape in 0..robot.shapes.len() {
+                let (before, now, after) = (at(shape, 0.5 - 1e-5), at(shape, 0.5), at(shape, 0.5 + 1e-5));
+                let velocity = (after.posed.centre - before.posed.centre) / 2e-5;
+                prop_assert!((velocity - now.velocity).norm() < 1e-7);
+                let turning = (after.posed.turn - before.posed.turn) / 2e-5;
+                prop_assert!((turning - now.spin.cross_matrix() * now.posed.turn).norm() < 1e-7);
+            }
+        }
+    }
+}

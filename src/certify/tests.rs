@@ -1,0 +1,5 @@
+//! The certificate as a whole: against dense sampling on random robots, maps and commands, and on cases made to slip through.
+
+mod clearance;
+mod faults;
+pub(crate) mod robots;

@@ -1,0 +1,182 @@
+use nalgebra::Isometry3;
+
+use super::robots::*;
+use crate::certify::{Certificate, END_ANGLE_TOLERANCE, END_POINT_TOLERANCE, RefusalKind, Task, certify};
+use crate::command::CommandTable;
+use crate::geom::Pose2;
+use crate::map::VoxelMap;
+use crate::mission::Unknown;
+use crate::robot::{Convex, MotionLimits, RobotModel};
+
+/// One arm; a ramp up and down again, so that every difference is known: speeds 0.1, 0.2, 0.1 m/s and rad/s each 0.1 s.
+fn case() -> (RobotModel, CommandTable, Task) {
+    let mut robot = with_joint(bare_robot(), false);
+    robot = with_body(robot, 0, Isometry3::identity(), [0.0, 1.0, 0.0], (0, 1.0, 0.0));
+    robot = with_shape(robot, 1, Isometry3::translation(0.0, 0.0, 0.2), Convex::Sphere { radius: 0.1 });
+    let held = [0.1, 0.2, 0.1].map(|v| (v, 0.0, vec![v]));
+    let (table, task) = commands(&robot, Pose2::new(1.0, 2.0, 0.5), &[0.3], 0.1, &held);
+    (robot, table, task)
+}
+
+fn kinds(certificate: &Certificate) -> Vec<RefusalKind> {
+    certificate.refusals.iter().map(|r| r.kind).collect()
+}
+
+#[test]
+fn sound_commands_without_a_map_are_certified() {
+    let (robot, table, task) = case();
+    let certificate = certify(&table, &robot, None, &task);
+    assert!(certificate.holds() && certificate.limits_hold, "{:?}", certificate.refusals);
+    assert_eq!((certificate.clearance_required, certificate.clearance_proven), (None, None));
+    assert!(certificate.end_point_error < 1e-12 && certificate.end_heading_error.unwrap() < 1e-12);
+}
+
+#[test]
+fn peaks_are_differences_with_rest_before_and_after() {
+    let (robot, table, task) = case();
+    let certificate = certify(&table, &robot, None, &task);
+    let names: Vec<_> = certificate.limits.iter().map(|c| (c.actuator.as_str(), c.quantity)).collect();
+    let quantities = ["speed", "acceleration", "jerk"];
+    let expected: Vec<_> =
+        ["wheel_left", "wheel_right", "joint_0"].into_iter().flat_map(|a| quantities.map(|q| (a, q))).collect();
+    assert_eq!(names, expected);
+    for check in &certificate.limits {
+        // 0 .1 .2 .1 0: first differences .1 .1 -.1 -.1, second .1 0 -.2 0 .1
+        let peak = match check.quantity {
+            "speed" => 0.2,
+            "acceleration" => 1.0,
+            _ => 20.0,
+        };
+        assert!((check.peak - peak).abs() < 1e-12 && check.limit.is_none(), "{check:?}");
+    }
+}
+
+#[test]
+fn a_peak_at_its_limit_passes_and_one_a_millionth_over_does_not() {
+    let (mut robot, table, task) = case();
+    let peaks = [0.2, 1.0, 20.0];
+    for exceeded in 0..3 {
+        for joint in [false, true] {
+            let limits = |scale: f64| MotionLimits {
+                speed: Some(peaks[0] * if exceeded == 0 { scale } else { 1.0 }),
+                acceleration: Some(peaks[1] * if exceeded == 1 { scale } else { 1.0 }),
+                jerk: Some(peaks[2] * if exceeded == 2 { scale } else { 1.0 }),
+            };
+            for (scale, expected) in [(1.0, vec![]), (1.0 - 1e-6, vec![RefusalKind::Limit; if joint { 1 } else { 2 }])]
+            {
+                (robot.wheel, robot.joints[0].limits) =
+                    if joint { (FREE, limits(scale)) } else { (limits(scale), FREE) };
+                let certificate = certify(&table, &robot, None, &task);
+                assert_eq!(kinds(&certificate), expected, "{:?}", certificate.refusals);
+                assert_eq!(certificate.limits_hold, expected.is_empty());
+            }
+        }
+    }
+}
+
+#[test]
+fn the_last_difference_to_rest_counts() {
+    let (mut robot, mut table, mut task) = case();
+    table.rows.remove(2); // now from 0.2 m/s to rest at once
+    table.rows[2].joint_positions[0] = 0.33;
+    task.goal = crate::certify::Goal {
+        x: 1.0 + 0.03 * 0.5f64.cos(),
+        y: 2.0 + 0.03 * 0.5f64.sin(),
+        yaw: None,
+        joints: vec![None],
+    };
+    robot.wheel.acceleration = Some(1.9);
+    assert_eq!(kinds(&certify(&table, &robot, None, &task)), [RefusalKind::Limit; 2]);
+    robot.wheel.acceleration = Some(2.0);
+    assert!(certify(&table, &robot, None, &task).holds());
+}
+
+#[test]
+fn a_joint_outside_its_range_is_refused() {
+    let (mut robot, table, task) = case();
+    (robot.joints[0].lower, robot.joints[0].upper) = (0.3, 0.34);
+    assert!(certify(&table, &robot, None, &task).holds());
+    robot.joints[0].upper = 0.339999;
+    let certificate = certify(&table, &robot, None, &task);
+    assert_eq!(kinds(&certificate), [RefusalKind::Position]);
+    assert!(!certificate.limits_hold);
+    (robot.joints[0].lower, robot.joints[0].upper) = (0.300001, 1.0);
+    assert_eq!(kinds(&certify(&table, &robot, None, &task)), [RefusalKind::Position]);
+}
+
+#[test]
+fn ends_beyond_the_tolerance_are_refused() {
+    let (robot, table, task) = case();
+    for (scale, expected) in [(0.999, vec![]), (1.001, vec![RefusalKind::End])] {
+        let mut off = task.clone();
+        off.goal.x += scale * END_POINT_TOLERANCE;
+        assert_eq!(kinds(&certify(&table, &robot, None, &off)), expected);
+        let mut off = task.clone();
+        off.goal.yaw = Some(0.5 + scale * END_ANGLE_TOLERANCE + std::f64::consts::TAU);
+        assert_eq!(kinds(&certify(&table, &robot, None, &off)), expected);
+        let mut off = task.clone();
+        off.goal.joints = vec![Some(0.34 - scale * END_ANGLE_TOLERANCE)];
+        assert_eq!(kinds(&certify(&table, &robot, None, &off)), expected);
+    }
+    let mut open = task;
+    (open.goal.yaw, open.goal.joints) = (None, vec![None]);
+    assert_eq!(certify(&table, &robot, None, &open).end_heading_error, None);
+}
+
+#[test]
+fn every_fault_of_a_table_is_refused() {
+    let (robot, table, task) = case();
+    let map = VoxelMap::new(0.1, [0.0; 3], [40, 40, 10], Unknown::Occupied);
+    type Change = fn(&mut CommandTable, &mut Task);
+    let faults: [(&str, Change); 20] = [
+        ("no rows", |t, _| t.rows.clear()),
+        ("wheel not a number", |t, _| t.rows[1].wheel_left = f64::NAN),
+        ("wheel infinite", |t, _| t.rows[1].wheel_right = f64::INFINITY),
+        ("wheel too large", |t, _| t.rows[1].wheel_right = 1e300),
+        ("pose not a number", |t, _| t.rows[2].pose.yaw = f64::NAN),
+        ("position not a number", |t, _| t.rows[2].joint_positions[0] = f64::NAN),
+        ("speed not a number", |t, _| t.rows[2].joint_velocities[0] = f64::NAN),
+        ("sampling time zero", |t, _| t.sampling_time = 0.0),
+        ("sampling time not a number", |t, _| t.sampling_time = f64::NAN),
+        ("other wheels", |t, _| t.wheel_radius = 0.11),
+        ("other track", |t, _| t.track_width = 0.41),
+        ("joint missing", |t, _| t.joints.clear()),
+        ("joint of another name", |t, _| t.joints[0].0 = "other".into()),
+        ("joint of another kind", |t, _| t.joints[0].1 = true),
+        ("row without joints", |t, _| t.rows[1].joint_positions.clear()),
+        ("start elsewhere", |t, _| t.rows[0].pose.x += 2e-6),
+        ("start turned", |t, _| t.rows[0].pose.yaw += 2e-6),
+        ("position off its speed", |t, _| t.rows[2].joint_positions[0] += 2e-6),
+        ("task not a number", |_, task| task.clearance = f64::NAN),
+        ("task of another robot", |_, task| task.start_joints.clear()),
+    ];
+    for (what, change) in faults {
+        let (mut table, mut task) = (table.clone(), task.clone());
+        change(&mut table, &mut task);
+        for map in [None, Some(&map)] {
+            let certificate = certify(&table, &robot, map, &task);
+            assert!(kinds(&certificate).contains(&RefusalKind::Table), "{what}: {:?}", certificate.refusals);
+        }
+    }
+}
+
+#[test]
+fn a_table_that_does_not_end_at_rest_is_refused() {
+    let (robot, table, task) = case();
+    for change in [
+        |t: &mut CommandTable| t.rows[3].wheel_left = 1e-9,
+        |t: &mut CommandTable| t.rows[3].joint_velocities[0] = 1e-9,
+    ] {
+        let mut moving = table.clone();
+        change(&mut moving);
+        assert_eq!(kinds(&certify(&moving, &robot, None, &task)), [RefusalKind::End]);
+    }
+}
+
+#[test]
+fn what_is_written_is_judged_not_what_is_planned() {
+    // The planned poses may lie anywhere (sampling leaves the path); only the replay counts.
+    let (robot, mut table, task) = case();
+    table.rows[2].pose.x += 0.5;
+    assert!(certify(&table, &robot, None, &task).holds());
+}
