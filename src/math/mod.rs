@@ -1,3 +1,8 @@
 //! Numeric tools that know no robot, map or configuration.
 
+pub mod block_tridiagonal;
+#[cfg(test)]
+pub(crate) mod fd;
+pub mod lbfgs;
 pub mod poly;
+pub mod smooth;
