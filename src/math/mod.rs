@@ -1,4 +1,9 @@
 //! Numeric tools that know no robot, map or configuration.
 
+pub mod block_tridiagonal;
+#[cfg(test)]
+pub(crate) mod fd;
 pub mod gjk;
+pub mod lbfgs;
 pub mod poly;
+pub mod smooth;

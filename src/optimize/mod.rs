@@ -1,21 +1,97 @@
 //! Stage 7: MINCO (s = 4) over (x, y, joints): smooths the search's path under [SCR]'s penalties.
+//!
+//! `sections` cuts the path at cusps and large spins; each driven section becomes one curve (`leg`): first guess (`initial`),
+//! cost and gradient ([`objective`] over [`minco`], [`flatness`], [`penalty`], [`contour`]), L-BFGS. A section whose curve is
+//! not sound is cut at all its spins and driven stop, spin, go.
+
+mod basis;
+pub mod contour;
+pub mod flatness;
+mod initial;
+mod leg;
+pub mod minco;
+pub mod objective;
+mod options;
+pub mod penalty;
+mod sections;
+#[cfg(test)]
+pub(crate) mod test_robot;
+pub mod time_map;
 
 use crate::esdf::Esdf;
 use crate::robot::RobotModel;
 use crate::search::SearchPath;
-use crate::trajectory::Trajectory;
+use crate::trajectory::{Ending, Leg, OptimiserOutcome, Trajectory, TrajectorySource};
 
-/// How to optimise.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OptimizeOptions {
-    /// Clearance to aim at, m: what must be certified plus a margin for what sampling misses.
-    pub clearance: f64,
-    /// Dense sampling on ([SCR] section IV-C).
-    pub dense: bool,
-}
+use leg::{Context, SolvedLeg, solve};
+pub use options::OptimizeOptions;
+pub use penalty::clearance::DistanceField;
+use sections::{DriveSection, Section, Thresholds, sections, still};
 
-/// Smooths a path.
+/// Smooths a path. Legs begin and end exactly at the path's states; headings keep the path's branch, so the last one is the
+/// path's own. Always returns a trajectory without NaN; how well it went is in [`Trajectory::optimiser`].
 pub fn optimize(path: &SearchPath, esdf: &Esdf, robot: &RobotModel, options: &OptimizeOptions) -> Trajectory {
-    let _ = (path, esdf, robot, options);
-    todo!()
+    optimize_in(path, esdf, robot, options)
 }
+
+/// [`optimize`] in any distance field.
+pub fn optimize_in<F: DistanceField>(
+    path: &SearchPath,
+    field: &F,
+    robot: &RobotModel,
+    options: &OptimizeOptions,
+) -> Trajectory {
+    let context = Context::new(robot, field, options);
+    let mut legs = Vec::new();
+    let mut outcome = OptimiserOutcome { pieces: 0, iterations: 0, ending: Ending::Converged, cost: 0.0 };
+    for section in sections(path, 0, path.moves.len(), &context.limits, Thresholds::of(options)) {
+        match section {
+            Section::Still(leg) => legs.push(Leg::Still(leg)),
+            Section::Drive(drive) => solve_or_split(path, drive, &context, &mut legs, &mut outcome),
+        }
+    }
+    if legs.is_empty() {
+        legs.extend(path.states.first().zip(path.states.last()).map(|(a, b)| Leg::Still(still(a, b))));
+    }
+    Trajectory { legs, source: TrajectorySource::Optimised, optimiser: Some(outcome) }
+}
+
+fn solve_or_split<F: DistanceField>(
+    path: &SearchPath,
+    drive: DriveSection,
+    context: &Context<'_, F>,
+    legs: &mut Vec<Leg>,
+    outcome: &mut OptimiserOutcome,
+) {
+    let solved = solve(path, &drive, context);
+    outcome.iterations += solved.iterations;
+    if solved.sound {
+        return keep(solved, legs, outcome);
+    }
+    let parts = sections(path, drive.first, drive.last, &context.limits, Thresholds::NONE);
+    if parts.len() < 2 {
+        // Straight already: nothing to cut, so this is as good as it gets. The certificate judges.
+        return keep(solved, legs, outcome);
+    }
+    for part in parts {
+        match part {
+            Section::Still(leg) => legs.push(Leg::Still(leg)),
+            Section::Drive(drive) => {
+                let solved = solve(path, &drive, context);
+                outcome.iterations += solved.iterations;
+                keep(solved, legs, outcome);
+            }
+        }
+    }
+}
+
+fn keep(solved: SolvedLeg, legs: &mut Vec<Leg>, outcome: &mut OptimiserOutcome) {
+    outcome.pieces += solved.pieces;
+    outcome.cost += solved.cost;
+    outcome.ending = outcome.ending.max(solved.ending);
+    legs.push(Leg::Drive(solved.leg));
+}
+
+#[cfg(test)]
+#[path = "optimize_tests.rs"]
+mod tests;

@@ -1,0 +1,261 @@
+//! Contour points of every collision shape, in a tree that dismisses whole patches by one look-up of the distance field.
+//!
+//! The field is 1-Lipschitz: where it exceeds `clearance + r + slack` at the centre of a ball of radius r, every point in
+//! that ball is clear. `slack` covers what interpolation may do to the bound.
+
+use nalgebra::{Isometry3, Point3};
+
+use crate::robot::{Convex, RobotModel};
+
+/// Points in a leaf of the tree.
+const LEAF: usize = 4;
+
+/// A contour point, or for `radius > 0` a ball, fixed to a body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContourPoint {
+    /// In the body's frame, m.
+    pub at: Point3<f64>,
+    /// To take off the distance, m.
+    pub radius: f64,
+}
+
+/// A node of the tree: a ball that holds a range of points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Patch {
+    /// Of the ball, in the body's frame, m.
+    pub centre: Point3<f64>,
+    /// Of the ball, with the points' own radii, m.
+    pub radius: f64,
+    /// Its points are `points[first..last]`.
+    pub first: usize,
+    /// See `first`.
+    pub last: usize,
+    /// The node to go on with where this one is dismissed; children follow their parent.
+    pub skip_to: usize,
+    /// Has no children: look at its points.
+    pub leaf: bool,
+}
+
+/// All patches of one shape.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShapeContour {
+    /// Index into the robot's bodies.
+    pub body: usize,
+    /// In depth-first order; the first holds the whole shape.
+    pub patches: Vec<Patch>,
+}
+
+/// Contour points of the robot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contour {
+    /// One entry a collision shape.
+    pub shapes: Vec<ShapeContour>,
+    /// All points; patches name ranges.
+    pub points: Vec<ContourPoint>,
+}
+
+impl Contour {
+    /// Samples every shape: edges and rims at `spacing` (m), the inside of faces at twice that.
+    pub fn new(robot: &RobotModel, spacing: f64) -> Self {
+        let mut contour = Self { shapes: Vec::new(), points: Vec::new() };
+        for shape in &robot.shapes {
+            let mut points = surface_points(&shape.convex, &shape.pose, spacing);
+            let mut patches = Vec::new();
+            split(&mut points, contour.points.len(), &mut patches);
+            contour.points.extend(points);
+            contour.shapes.push(ShapeContour { body: shape.body, patches });
+        }
+        contour
+    }
+}
+
+fn surface_points(convex: &Convex, pose: &Isometry3<f64>, spacing: f64) -> Vec<ContourPoint> {
+    let local = match convex {
+        Convex::Sphere { radius } => return vec![ContourPoint { at: pose * Point3::origin(), radius: *radius }],
+        Convex::Box { half } => box_points(half, spacing),
+        Convex::Cylinder { radius, half_length } => cylinder_points(*radius, *half_length, spacing),
+        Convex::Hull { vertices } => hull_points(convex, vertices, spacing),
+    };
+    local.into_iter().map(|p| ContourPoint { at: pose * Point3::from(p), radius: 0.0 }).collect()
+}
+
+/// Number of equal steps no longer than `spacing` along `length`, at least one.
+fn steps(length: f64, spacing: f64) -> usize {
+    (length / spacing - 1e-9).ceil().max(1.0) as usize
+}
+
+fn box_points(half: &[f64; 3], spacing: f64) -> Vec<[f64; 3]> {
+    let n = half.map(|h| steps(2.0 * h, spacing));
+    let mut points = Vec::new();
+    for i in 0..=n[0] {
+        for j in 0..=n[1] {
+            for k in 0..=n[2] {
+                let index = [i, j, k];
+                let extremes = (0..3).filter(|&a| index[a] == 0 || index[a] == n[a]).count();
+                let coarse = (0..3).all(|a| index[a].is_multiple_of(2) || index[a] == n[a]);
+                if extremes >= 2 || (extremes == 1 && coarse) {
+                    points.push(std::array::from_fn(|a| half[a] * (2.0 * index[a] as f64 / n[a] as f64 - 1.0)));
+                }
+            }
+        }
+    }
+    points
+}
+
+fn cylinder_points(radius: f64, half_length: f64, spacing: f64) -> Vec<[f64; 3]> {
+    let mut points = Vec::new();
+    let mut ring = |radius: f64, z: f64, spacing: f64| {
+        let n = steps(std::f64::consts::TAU * radius, spacing).max(8);
+        for i in 0..n {
+            let (s, c) = (std::f64::consts::TAU * i as f64 / n as f64).sin_cos();
+            points.push([radius * c, radius * s, z]);
+        }
+    };
+    // The mantle's rings are as dense along the axis as around it: a cylinder has no edge there to be hit first.
+    let levels = steps(2.0 * half_length, spacing);
+    for level in 0..=levels {
+        ring(radius, half_length * (2.0 * level as f64 / levels as f64 - 1.0), spacing);
+    }
+    let rings = steps(radius, 2.0 * spacing);
+    for r in 1..rings {
+        for z in [-half_length, half_length] {
+            ring(radius * r as f64 / rings as f64, z, 2.0 * spacing);
+        }
+    }
+    points.extend([[0.0, 0.0, -half_length], [0.0, 0.0, half_length]]);
+    points
+}
+
+/// Directions spread evenly over the sphere.
+fn directions(count: usize) -> impl Iterator<Item = nalgebra::Vector3<f64>> {
+    let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
+    (0..count).map(move |i| {
+        let z = 1.0 - (2 * i + 1) as f64 / count as f64;
+        let flat = (1.0 - z * z).sqrt();
+        let (s, c) = (golden * i as f64).sin_cos();
+        nalgebra::Vector3::new(flat * c, flat * s, z)
+    })
+}
+
+/// Vertices, and points between pairs of them that lie near the surface, thinned to one a cell of half the spacing.
+fn hull_points(convex: &Convex, vertices: &[[f64; 3]], spacing: f64) -> Vec<[f64; 3]> {
+    let supports: Vec<_> = directions(256).map(|d| (d, convex.support(&d).dot(&d))).collect();
+    let depth = |p: &[f64; 3]| {
+        supports.iter().map(|(d, h)| h - d.x * p[0] - d.y * p[1] - d.z * p[2]).fold(f64::INFINITY, f64::min)
+    };
+    let mut points = vertices.to_vec();
+    let mut taken = std::collections::BTreeSet::new();
+    let cell = |p: &[f64; 3]| p.map(|v| (v / (0.5 * spacing)).round() as i64);
+    taken.extend(vertices.iter().map(&cell));
+    // Enough to bridge every edge of a plain hull; a finely meshed one has its vertices for that.
+    let nearest = if vertices.len() <= 24 { vertices.len() } else { 12 };
+    for (i, a) in vertices.iter().enumerate() {
+        let apart = |b: &[f64; 3]| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>();
+        let mut others: Vec<_> = vertices.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, b)| b).collect();
+        others.sort_by(|b, c| apart(b).total_cmp(&apart(c)));
+        for b in others.into_iter().take(nearest) {
+            let n = steps(apart(b).sqrt(), spacing);
+            for k in 1..n {
+                let f = k as f64 / n as f64;
+                let p: [f64; 3] = std::array::from_fn(|d| a[d] + f * (b[d] - a[d]));
+                if !taken.contains(&cell(&p)) && depth(&p) < 0.5 * spacing {
+                    taken.insert(cell(&p));
+                    points.push(p);
+                }
+            }
+        }
+    }
+    points
+}
+
+/// Builds the tree over `points`, which it reorders; `offset` is where they will lie among all points.
+fn split(points: &mut [ContourPoint], offset: usize, patches: &mut Vec<Patch>) {
+    let (mut low, mut high) = (Point3::from([f64::INFINITY; 3]), Point3::from([f64::NEG_INFINITY; 3]));
+    for p in points.iter() {
+        low = low.inf(&p.at);
+        high = high.sup(&p.at);
+    }
+    let centre = nalgebra::center(&low, &high);
+    let radius = points.iter().map(|p| (p.at - centre).norm() + p.radius).fold(0.0, f64::max);
+    let leaf = points.len() <= LEAF;
+    let own = patches.len();
+    patches.push(Patch { centre, radius, first: offset, last: offset + points.len(), skip_to: 0, leaf });
+    if !leaf {
+        let axis = (high - low).imax();
+        points.sort_by(|a, b| a.at[axis].total_cmp(&b.at[axis]));
+        let (one, two) = points.split_at_mut(points.len() / 2);
+        split(one, offset, patches);
+        split(two, offset + one.len(), patches);
+    }
+    patches[own].skip_to = patches.len();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn nearest(points: &[[f64; 3]], p: [f64; 3]) -> f64 {
+        points.iter().map(|q| (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt()).fold(f64::INFINITY, f64::min)
+    }
+
+    #[test]
+    fn every_point_of_a_box_edge_is_within_half_a_spacing_of_a_contour_point() {
+        let half = [0.21, 0.18, 0.11];
+        let points = box_points(&half, 0.05);
+        for i in 0..=400 {
+            let f = i as f64 / 200.0 - 1.0;
+            for (y, z) in [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0)] {
+                assert!(nearest(&points, [f * half[0], y * half[1], z * half[2]]) <= 0.025 + 1e-12);
+                assert!(nearest(&points, [y * half[0], f * half[1], z * half[2]]) <= 0.025 + 1e-12);
+                assert!(nearest(&points, [y * half[0], z * half[1], f * half[2]]) <= 0.025 + 1e-12);
+            }
+        }
+        assert!(nearest(&points, [0.01, 0.02, half[2]]) < 0.09);
+        assert!(points.iter().all(|p| (0..3).any(|a| (p[a].abs() - half[a]).abs() < 1e-12)));
+    }
+
+    #[test]
+    fn every_point_of_a_cylinder_rim_is_near_a_contour_point() {
+        let points = cylinder_points(0.08, 0.02, 0.05);
+        for i in 0..360 {
+            let (s, c) = (i as f64).to_radians().sin_cos();
+            for z in [-0.02, 0.02] {
+                assert!(nearest(&points, [0.08 * c, 0.08 * s, z]) < 0.026);
+            }
+        }
+    }
+
+    #[test]
+    fn a_cube_given_as_a_hull_has_its_edges_sampled_and_its_inside_not() {
+        let corner = |i: usize| [0, 1, 2].map(|a| if i >> a & 1 == 1 { 0.2 } else { -0.2 });
+        let vertices: Vec<_> = (0..8).map(corner).collect();
+        let points = hull_points(&Convex::Hull { vertices: vertices.clone() }, &vertices, 0.05);
+        for i in 0..=100 {
+            let f = i as f64 / 250.0 - 0.2;
+            assert!(nearest(&points, [f, 0.2, -0.2]) < 0.03, "{f}");
+        }
+        assert!(points.iter().all(|p| p.iter().any(|v| v.abs() > 0.15)));
+    }
+
+    #[test]
+    fn every_patch_holds_its_points_and_leaves_hold_all() {
+        let mut points: Vec<_> = box_points(&[0.3, 0.2, 0.1], 0.05)
+            .into_iter()
+            .map(|p| ContourPoint { at: p.into(), radius: 0.01 })
+            .collect();
+        let mut patches = Vec::new();
+        split(&mut points, 0, &mut patches);
+        let mut seen = 0;
+        for patch in &patches {
+            for p in &points[patch.first..patch.last] {
+                assert!((p.at - patch.centre).norm() + p.radius <= patch.radius + 1e-12);
+            }
+            if patch.leaf {
+                assert_eq!(patch.first, seen);
+                seen = patch.last;
+            }
+        }
+        assert_eq!(seen, points.len());
+        assert_eq!(patches[0].skip_to, patches.len());
+    }
+}

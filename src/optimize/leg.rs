@@ -1,0 +1,154 @@
+//! One driven leg: from the first guess through the passes of L-BFGS to a curve in real time.
+
+use super::contour::Contour;
+use super::initial::guess;
+use super::minco::{Minco, TERMS};
+use super::objective::{Objective, Violation};
+use super::options::OptimizeOptions;
+use super::penalty::Limits;
+use super::penalty::clearance::{ClearancePenalty, DistanceField};
+use super::sections::DriveSection;
+use crate::geom::unwrap_near;
+use crate::math::lbfgs::{Lbfgs, Stop};
+use crate::math::poly::{Piece, PiecewisePoly};
+use crate::robot::RobotModel;
+use crate::search::SearchPath;
+use crate::trajectory::{DriveLeg, Ending};
+
+/// Samples a piece by which a finished curve is judged, per sparse sample.
+const JUDGE_DENSITY: usize = 4;
+/// A limit overstepped by this share makes the whole motion crawl once it is slowed down to keep it.
+const HOPELESS: f64 = 0.5;
+
+/// What all legs of one robot share.
+pub(crate) struct Context<'a, F> {
+    pub robot: &'a RobotModel,
+    pub field: &'a F,
+    pub limits: Limits,
+    pub clearance: ClearancePenalty,
+    pub options: &'a OptimizeOptions,
+}
+
+impl<'a, F: DistanceField> Context<'a, F> {
+    /// Samples the robot's contour.
+    pub fn new(robot: &'a RobotModel, field: &'a F, options: &'a OptimizeOptions) -> Self {
+        let spacing = options.contour_spacing.unwrap_or_else(|| field.cell().clamp(0.03, 0.08));
+        let contour = Contour::new(robot, spacing);
+        let scale = options.clearance_scale;
+        Self {
+            robot,
+            field,
+            limits: Limits::new(robot, options.penalty_width),
+            clearance: ClearancePenalty::new(contour, robot.bodies.len(), options.clearance, scale, field.cell()),
+            options,
+        }
+    }
+}
+
+/// A leg and how it came about.
+pub(crate) struct SolvedLeg {
+    pub leg: DriveLeg,
+    pub pieces: usize,
+    pub iterations: usize,
+    pub cost: f64,
+    pub ending: Ending,
+    /// Keeps its heading's branch, its clearance within the tolerance, and roughly its limits.
+    pub sound: bool,
+    pub violation: Violation,
+}
+
+/// Optimises one section.
+pub(crate) fn solve<F: DistanceField>(
+    path: &SearchPath,
+    section: &DriveSection,
+    context: &Context<'_, F>,
+) -> SolvedLeg {
+    let options = context.options;
+    let first = guess(path, section, &context.limits, options);
+    let minco = Minco::new(first.pieces, &first.start, &first.end);
+    let clearance = context.clearance.clone();
+    let mut objective = Objective::new(context.robot, context.field, minco, section.reverse, clearance, options);
+    let mut iteration = Lbfgs::new(objective.dimension(), options.lbfgs.clone());
+    let mut x = first.variables;
+    let judged_at = options.samples_per_piece.max(1) * JUDGE_DENSITY;
+    let (mut iterations, mut cost, mut ending) = (0, f64::NAN, Ending::Converged);
+    let mut violation = Violation { motion: f64::INFINITY, clearance: f64::INFINITY };
+    for _ in 0..options.passes.max(1) {
+        let end = iteration.minimise(&mut x, |x, g| objective.evaluate(x, g));
+        iterations += end.iterations;
+        cost = end.cost;
+        ending = match end.stop {
+            Stop::Converged => Ending::Converged,
+            Stop::IterationLimit => Ending::IterationLimit,
+            Stop::LineSearchStalled => Ending::LineSearchStalled,
+        };
+        if !cost.is_finite() {
+            cost = 0.0;
+            ending = Ending::LineSearchStalled;
+            break;
+        }
+        violation = objective.violation(&x, judged_at);
+        let (fast, near) =
+            (violation.motion > options.motion_tolerance, violation.clearance > options.pass_clearance_tolerance);
+        if !fast && !near {
+            break;
+        }
+        if fast {
+            objective.weights.motion *= options.weight_growth;
+            objective.weights.dense *= options.weight_growth;
+        }
+        if near {
+            objective.weights.clearance *= options.weight_growth;
+        }
+    }
+    let checked = objective.violation(&x, judged_at);
+    if violation.motion.is_finite() {
+        violation = checked;
+    }
+    let curve = real_time(objective.curve());
+    let (from, to) = (path.states[section.first].pose.yaw, path.states[section.last].pose.yaw);
+    let leg = DriveLeg { curve, reverse: section.reverse, yaw_start: from };
+    let slack = options.clearance_tolerance;
+    let sound = violation.motion < HOPELESS
+        && violation.clearance < slack
+        && heading_at_end(&leg, judged_at).is_some_and(|yaw| (yaw - to).abs() < 0.05);
+    SolvedLeg { pieces: leg.curve.pieces.len(), leg, iterations, cost, ending, sound, violation }
+}
+
+/// Heading at the end of a leg, followed along the curve; `None` where it jumps (the curve stops and turns back).
+pub(crate) fn heading_at_end(leg: &DriveLeg, per_piece: usize) -> Option<f64> {
+    let side = if leg.reverse { -1.0 } else { 1.0 };
+    let mut yaw = leg.yaw_start;
+    for piece in &leg.curve.pieces {
+        for k in 0..=per_piece {
+            let t = piece.duration * k as f64 / per_piece as f64;
+            let next = unwrap_near((side * piece.derivative(1, 1, t)).atan2(side * piece.derivative(0, 1, t)), yaw);
+            if !((next - yaw).abs() < 0.8) {
+                return None;
+            }
+            yaw = next;
+        }
+    }
+    Some(yaw)
+}
+
+/// The curve with coefficients in powers of seconds.
+fn real_time(curve: &Minco) -> PiecewisePoly {
+    let m = curve.dimensions();
+    let pieces = curve
+        .durations()
+        .iter()
+        .enumerate()
+        .map(|(piece, &duration)| {
+            let coefficients = (0..m)
+                .map(|d| {
+                    (0..TERMS)
+                        .map(|k| curve.coefficients()[(piece * TERMS + k) * m + d] / duration.powi(k as i32))
+                        .collect()
+                })
+                .collect();
+            Piece { duration, coefficients }
+        })
+        .collect();
+    PiecewisePoly { pieces }
+}

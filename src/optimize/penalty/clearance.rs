@@ -1,0 +1,183 @@
+//! Clearance of every contour point, [SCR] Eq. 20 to 23, for any tree of joints.
+//!
+//! The gradient goes back as forces do: each body gathers force and torque of its points, hands them to its parent, and a joint
+//! feels the part along its axis. The base feels a force (by position) and a torque about z (by heading).
+
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+
+use super::Judge;
+use crate::optimize::contour::Contour;
+use crate::robot::RobotModel;
+
+/// A signed distance to obstacles, m.
+pub trait DistanceField {
+    /// Distance at a point in the map frame.
+    fn distance(&self, p: [f64; 3]) -> f64;
+    /// Distance and its gradient.
+    fn distance_gradient(&self, p: [f64; 3]) -> (f64, [f64; 3]);
+    /// Size of a cell that values are interpolated over, m; 0 for an exact field.
+    fn cell(&self) -> f64;
+}
+
+impl DistanceField for crate::esdf::Esdf {
+    fn distance(&self, p: [f64; 3]) -> f64 {
+        self.distance(p)
+    }
+    fn distance_gradient(&self, p: [f64; 3]) -> (f64, [f64; 3]) {
+        self.distance_gradient(p)
+    }
+    fn cell(&self) -> f64 {
+        self.resolution
+    }
+}
+
+/// Interpolated values lie at most 0.26 cells above and sqrt(3)/2 cells below the true distance (MATH section 4), so a ball's
+/// centre bounds its points up to the sum.
+const INTERPOLATION_SLACK: f64 = 1.13;
+
+#[derive(Debug, Clone, Copy)]
+struct BodyFrame {
+    rotation: Matrix3<f64>,
+    /// Relative to the base's origin, map axes.
+    origin: Vector3<f64>,
+    force: Vector3<f64>,
+    /// About the base's origin.
+    torque: Vector3<f64>,
+}
+
+/// Scratch memory and constants of the penalty.
+#[derive(Debug, Clone)]
+pub struct ClearancePenalty {
+    contour: Contour,
+    clearance: f64,
+    /// Violations are divided by this, m.
+    scale: f64,
+    slack: f64,
+    poses: Vec<Isometry3<f64>>,
+    frames: Vec<BodyFrame>,
+}
+
+/// Derivatives of the clearance penalty by the pose of the base.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ByPose {
+    /// By x and y.
+    pub position: [f64; 2],
+    /// By the heading.
+    pub heading: f64,
+}
+
+impl ClearancePenalty {
+    /// For `contour`, wanting `clearance` m in a field with cells of `cell` m; violations count in units of `scale` m.
+    pub fn new(contour: Contour, bodies: usize, clearance: f64, scale: f64, cell: f64) -> Self {
+        let frame = BodyFrame {
+            rotation: Matrix3::identity(),
+            origin: Vector3::zeros(),
+            force: Vector3::zeros(),
+            torque: Vector3::zeros(),
+        };
+        Self {
+            contour,
+            clearance,
+            scale,
+            slack: INTERPOLATION_SLACK * cell,
+            poses: Vec::with_capacity(bodies),
+            frames: vec![frame; bodies],
+        }
+    }
+
+    fn place(&mut self, robot: &RobotModel, heading: [f64; 2], q: &[f64]) {
+        robot.body_poses(q, &mut self.poses);
+        let [c, s] = heading;
+        let turn = Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0);
+        for (frame, pose) in self.frames.iter_mut().zip(&self.poses) {
+            frame.rotation = turn * pose.rotation.to_rotation_matrix().into_inner();
+            frame.origin = turn * pose.translation.vector;
+            frame.force = Vector3::zeros();
+            frame.torque = Vector3::zeros();
+        }
+    }
+
+    /// Cost at a pose: position (m), heading as (cos, sin), joint values. Adds to `by_pose` and to `by_joints`.
+    #[allow(clippy::too_many_arguments)]
+    pub(crate) fn add(
+        &mut self,
+        robot: &RobotModel,
+        field: &impl DistanceField,
+        position: [f64; 2],
+        heading: [f64; 2],
+        q: &[f64],
+        judge: &mut impl Judge,
+        by_pose: &mut ByPose,
+        by_joints: &mut [f64],
+    ) -> f64 {
+        self.place(robot, heading, q);
+        let base = Vector3::new(position[0], position[1], 0.0);
+        let mut sum = 0.0;
+        let mut touched = false;
+        for shape in &self.contour.shapes {
+            let frame = &mut self.frames[shape.body];
+            let placed = |p: &Point3<f64>| frame.rotation * p.coords + frame.origin;
+            let (mut force, mut torque) = (Vector3::zeros(), Vector3::zeros());
+            let mut node = 0;
+            while let Some(patch) = shape.patches.get(node) {
+                let centre = placed(&patch.centre) + base;
+                if field.distance(centre.into()) > self.clearance + patch.radius + self.slack {
+                    node = patch.skip_to;
+                    continue;
+                }
+                node += 1;
+                if !patch.leaf {
+                    continue;
+                }
+                for point in &self.contour.points[patch.first..patch.last] {
+                    let arm = placed(&point.at);
+                    let (distance, gradient) = field.distance_gradient((arm + base).into());
+                    let (cost, slope) = judge.weigh((self.clearance + point.radius - distance) / self.scale);
+                    sum += cost;
+                    if slope != 0.0 {
+                        let push = Vector3::from(gradient) * (-slope / self.scale);
+                        force += push;
+                        torque += arm.cross(&push);
+                        touched = true;
+                    }
+                }
+            }
+            frame.force += force;
+            frame.torque += torque;
+        }
+        if touched {
+            self.gather(robot, by_pose, by_joints);
+        }
+        sum
+    }
+
+    /// Hands forces down to the base; a body comes after its parent.
+    fn gather(&mut self, robot: &RobotModel, by_pose: &mut ByPose, by_joints: &mut [f64]) {
+        for (index, body) in robot.bodies.iter().enumerate().skip(1).rev() {
+            let frame = self.frames[index];
+            if let Some(motion) = &body.motion {
+                let axis = frame.rotation * motion.axis.into_inner();
+                let felt = if motion.prismatic {
+                    axis.dot(&frame.force)
+                } else {
+                    axis.dot(&(frame.torque - frame.origin.cross(&frame.force)))
+                };
+                by_joints[motion.joint] += motion.multiplier * felt;
+            }
+            let parent = &mut self.frames[body.parent];
+            parent.force += frame.force;
+            parent.torque += frame.torque;
+        }
+        let base = &self.frames[0];
+        by_pose.position[0] += base.force.x;
+        by_pose.position[1] += base.force.y;
+        by_pose.heading += base.torque.z;
+    }
+}
+
+impl ClearancePenalty {
+    /// Metres that count as one.
+    pub(crate) fn scale(&self) -> f64 {
+        self.scale
+    }
+}
