@@ -3,6 +3,8 @@
 //! A [`Trajectory`] is a list of [`Leg`]s, each from rest to rest. What may jump between legs: the direction of driving, the
 //! kind of motion. What may not: position, heading (radians, not wrapped), joint values.
 
+pub mod plane_curve;
+
 use crate::geom::Pose2;
 use crate::math::poly::PiecewisePoly;
 
