@@ -189,3 +189,6 @@ fn is_one_cubic(legs: &[Leg]) -> bool {
     let [piece] = drive.curve.pieces.as_slice() else { return false };
     piece.coefficients.iter().all(|c| c.len() <= 4)
 }
+
+#[cfg(test)]
+mod tests;
