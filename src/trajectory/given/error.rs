@@ -109,13 +109,11 @@ pub enum GivenError {
         at: Span,
     },
     /// The spline through the rows has a cusp.
-    #[error(
-        "line {line}: the path turns back on itself between this row and the next, its curve has no direction there"
-    )]
+    #[error("line {line}: the path turns back on itself at or after this row: its curve has no direction there")]
     TurnsBack {
         /// From 1.
         line: usize,
-        /// The row before the cusp.
+        /// The last row before the cusp, or at it.
         at: Span,
     },
     /// A joint's spline leaves the joint's range.

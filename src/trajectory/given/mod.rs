@@ -169,3 +169,6 @@ pub fn from_csv(
     let leg = DriveLeg { curve: curve.poly().clone(), reverse: false, yaw_start: curve.start_heading() };
     Ok(Trajectory { legs: vec![Leg::Drive(leg)], source: TrajectorySource::Given, optimiser: None })
 }
+
+#[cfg(test)]
+mod tests;
