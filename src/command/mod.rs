@@ -1,7 +1,16 @@
 //! Stage 9: sampled commands, as they are written.
 
+pub mod end_point;
+pub mod error;
+pub mod limits;
+mod replay;
+pub mod sample;
+
 use crate::geom::Pose2;
 use crate::mission::Sampling;
+
+pub use error::CommandError;
+pub use sample::{sample, sample_uncorrected};
 
 /// The command table: what is written to `commands.csv`, no more and no less. Row k is held from `time(k)` to `time(k + 1)`;
 /// the last row is at rest.

@@ -6,4 +6,6 @@ pub(crate) mod fd;
 pub mod gjk;
 pub mod lbfgs;
 pub mod poly;
+pub mod quadrature;
 pub mod smooth;
+pub mod spline;

@@ -3,6 +3,11 @@
 //! A [`Trajectory`] is a list of [`Leg`]s, each from rest to rest. What may jump between legs: the direction of driving, the
 //! kind of motion. What may not: position, heading (radians, not wrapped), joint values.
 
+#[cfg(test)]
+pub(crate) mod fixtures;
+pub mod given;
+pub mod plane_curve;
+
 use crate::geom::Pose2;
 use crate::math::poly::PiecewisePoly;
 

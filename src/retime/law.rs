@@ -1,0 +1,250 @@
+//! The time laws: which clock a leg gets, and by how much it is slowed down.
+
+use crate::mission::TimeLaw;
+use crate::robot::RobotModel;
+
+use super::RetimeError;
+use super::convolution::Convolution;
+use super::course::{Course, Curved, Proportional};
+use super::peaks::{peaks, slow_down};
+use super::timed_leg::{Clock, TimedLeg};
+use super::warp::Warp;
+
+/// Shortest ramp of `minco` that is tried, s, and the factor to the next one.
+const RAMPS: (f64, f64) = (0.05, 1.5);
+/// Below this share of the limit, what Eq. 5 leaves is no speed to drive with.
+const LEAST_SPEED: f64 = 1e-3;
+
+/// What the laws need to know besides the leg.
+#[derive(Debug, Clone, Copy)]
+pub struct Task<'a> {
+    /// Its limits.
+    pub robot: &'a RobotModel,
+    /// For how long a command is held, s.
+    pub hold: f64,
+    /// The curve's parameter is the optimiser's own time.
+    pub own_timing: bool,
+    /// The whole trajectory is one given cubic segment.
+    pub one_segment: bool,
+    /// Index of the leg, for messages.
+    pub leg: usize,
+}
+
+/// Times one leg under a law.
+///
+/// # Errors
+/// The law cannot time this leg.
+pub fn time_leg(course: &Course, law: TimeLaw, task: Task<'_>) -> Result<TimedLeg, RetimeError> {
+    let curved = match course {
+        Course::Proportional(p) => return Ok(proportional(p, task.robot)),
+        Course::Curved(curved) => curved,
+    };
+    match law {
+        TimeLaw::Auto => {
+            let mut best: Option<TimedLeg> = None;
+            for law in [TimeLaw::Minco, TimeLaw::Eq5, TimeLaw::FixedPoint] {
+                if let Ok(leg) = time_leg(course, law, task) {
+                    if best.as_ref().is_none_or(|best| leg.duration() < best.duration()) {
+                        best = Some(leg);
+                    }
+                }
+            }
+            Ok(best.expect("fixed_point times every curve"))
+        }
+        TimeLaw::FixedPoint => {
+            let limits = centre_limits(task.robot);
+            let speed = fixed_point_speed(curved, task.robot);
+            Ok(convolved(curved, TimeLaw::FixedPoint, Clock::ArcLength, [speed, limits[1], limits[2]], limits[0], task))
+        }
+        TimeLaw::Eq5 => corrected(curved, TimeLaw::Eq5, Clock::ArcLength, task),
+        TimeLaw::Printed if task.one_segment => corrected(curved, TimeLaw::Printed, Clock::Printed, task),
+        TimeLaw::Printed => Err(RetimeError::PrintedNeedsOneSegment),
+        TimeLaw::Minco if task.own_timing => Ok(own(curved, task)),
+        TimeLaw::Minco => Err(RetimeError::NoOwnTiming),
+        TimeLaw::Optimal | TimeLaw::Wheel => Err(RetimeError::NotYet { law: super::law_key(law) }),
+    }
+}
+
+/// Speed, acceleration and jerk that the centre's profile is made with, m/s, m/s^2, m/s^3.
+fn centre_limits(robot: &RobotModel) -> [f64; 3] {
+    let [v, a, j] = robot.wheel.planning();
+    [v.min(robot.base.speed), a.min(robot.base.acceleration), j]
+}
+
+/// What must hold after the slow-down, in the order of [`TimedLeg::rates`].
+fn binding(robot: &RobotModel) -> Vec<[Option<f64>; 3]> {
+    let of = |limits: &crate::robot::MotionLimits| [limits.speed, limits.acceleration, limits.jerk];
+    let mut all = vec![of(&robot.wheel); 2];
+    all.extend(robot.joints.iter().map(|joint| of(&joint.limits)));
+    all.push([Some(robot.base.speed), Some(robot.base.acceleration), None]);
+    all
+}
+
+/// The one law of everything that is linear in actuator space: the fastest profile of the share of the way under the limits of all
+/// actuators that move, and of the base.
+fn proportional(course: &Proportional, robot: &RobotModel) -> TimedLeg {
+    let mut limits = [f64::INFINITY; 3];
+    let mut keep = |change: f64, of: [f64; 3]| {
+        if change.abs() > 0.0 {
+            (0..3).for_each(|k| limits[k] = limits[k].min(of[k] / change.abs()));
+        }
+    };
+    course.wheel_changes().iter().for_each(|change| keep(*change, robot.wheel.planning()));
+    course.joint_changes.iter().zip(&robot.joints).for_each(|(change, joint)| keep(*change, joint.limits.planning()));
+    keep(course.drive, [robot.base.speed, robot.base.acceleration, f64::INFINITY]);
+    keep(course.turn, [robot.base.angular_speed, robot.base.angular_acceleration, f64::INFINITY]);
+    let moves = limits[0].is_finite();
+    TimedLeg {
+        course: Course::Proportional(course.clone()),
+        clock: Clock::Share(if moves {
+            Convolution::fastest(1.0, limits)
+        } else {
+            Convolution::fastest(0.0, [1.0; 3])
+        }),
+        stretch: 1.0,
+        law: None,
+        speed_limit: if course.drive != 0.0 { centre_limits(robot)[0] } else { 0.0 },
+        compensation: 0.0,
+    }
+}
+
+/// A convolution profile along a curve, slowed down until every limit holds.
+fn convolved(
+    curved: &Curved,
+    law: TimeLaw,
+    clock: fn(Convolution) -> Clock,
+    limits: [f64; 3],
+    uncompensated: f64,
+    task: Task<'_>,
+) -> TimedLeg {
+    let leg = TimedLeg {
+        course: Course::Curved(curved.clone()),
+        clock: clock(Convolution::fastest(curved.curve.length(), limits)),
+        stretch: 1.0,
+        law: Some(law),
+        speed_limit: limits[0],
+        compensation: uncompensated - limits[0],
+    };
+    slowed(leg, task)
+}
+
+fn slowed(leg: TimedLeg, task: Task<'_>) -> TimedLeg {
+    TimedLeg { stretch: slow_down(&leg.clock_peaks(true), &binding(task.robot), task.hold), ..leg }
+}
+
+/// [CONV] Eq. 5, applied once: the speed limit less what the wheels differ by under the uncorrected profile.
+///
+/// # Errors
+/// Nothing is left.
+fn corrected(
+    curved: &Curved,
+    law: TimeLaw,
+    clock: fn(Convolution) -> Clock,
+    task: Task<'_>,
+) -> Result<TimedLeg, RetimeError> {
+    let [v, a, j] = centre_limits(task.robot);
+    let uncorrected = convolved(curved, law, clock, [v, a, j], v, task);
+    let breaks: Vec<f64> = uncorrected.breaks().iter().map(|t| t / uncorrected.stretch).collect();
+    let at_full_speed = TimedLeg { stretch: 1.0, ..uncorrected };
+    let mut rates = Vec::new();
+    let compensation = peaks(&breaks, true, |t, out| {
+        rates.clear();
+        at_full_speed.rates(t, &mut rates);
+        out.push([0.5 * (rates[1][0] - rates[0][0]), 0.0, 0.0]);
+    })
+    .rates[0][0];
+    let wheel_speed = task.robot.wheel.planning()[0];
+    let left = v.min(wheel_speed - compensation);
+    if left <= LEAST_SPEED * v {
+        let (curvature, _) = largest_bends(curved);
+        return Err(RetimeError::CompensationLeavesNoSpeed {
+            leg: task.leg,
+            radius: 1.0 / curvature,
+            half_track: curved.half_track,
+            left: wheel_speed - compensation,
+        });
+    }
+    Ok(convolved(curved, law, clock, [left, a, j], v, task))
+}
+
+/// The centre's cruise at which the faster wheel just keeps its limit where the curve bends most, `v_max / (1 + D/2 max|curvature|)`, and
+/// no joint exceeds its own: the fixed point of Eq. 5 at constant speed, extended to joints.
+fn fixed_point_speed(curved: &Curved, robot: &RobotModel) -> f64 {
+    let (curvature, joints) = largest_bends(curved);
+    let wheels = robot.wheel.planning()[0] / (1.0 + curved.half_track * curvature);
+    let slowest_joint =
+        robot.joints.iter().zip(joints).fold(f64::INFINITY, |slowest, (joint, rate)| match rate > 0.0 {
+            true => slowest.min(joint.limits.planning()[0] / rate),
+            false => slowest,
+        });
+    wheels.min(slowest_joint).min(centre_limits(robot)[0])
+}
+
+/// Largest |curvature| (1/m) and |d(joint)/d(arc length)| of a curve.
+fn largest_bends(curved: &Curved) -> (f64, Vec<f64>) {
+    let curve = &curved.curve;
+    let breaks: Vec<f64> = curve.nodes().map(|node| curve.parameter(node)).collect();
+    let found = peaks(&breaks, true, |u, out| {
+        let place = curve.place(u);
+        let rates = curve.rates(place);
+        out.push([rates.turn[0] / rates.speed[0], 0.0, 0.0]);
+        let dimensions = curve.poly().pieces[0].coefficients.len();
+        out.extend((2..dimensions).map(|d| [curve.jet(d, place)[1] / rates.speed[0], 0.0, 0.0]));
+    });
+    (found.rates[0][0], found.rates[1..].iter().map(|r| r[0]).collect())
+}
+
+/// The optimiser's own timing, with the pair of ramps by which the leg ends soonest after its slow-down.
+fn own(curved: &Curved, task: Task<'_>) -> TimedLeg {
+    let seconds = curved.curve.duration();
+    let limits = binding(task.robot);
+    let leg = |ramps: [f64; 2]| TimedLeg {
+        course: Course::Curved(curved.clone()),
+        clock: Clock::Own(Warp::new(seconds, ramps)),
+        stretch: 1.0,
+        law: Some(TimeLaw::Minco),
+        speed_limit: 0.0,
+        compensation: 0.0,
+    };
+    let lengths: Vec<f64> = std::iter::successors(Some(RAMPS.0), |r| Some(r * RAMPS.1))
+        .take_while(|r| *r < seconds.min(10.0))
+        .chain([seconds.min(10.0)])
+        .collect();
+    // What each ramp asks for, and what the stretch between asks for at the curve's own speed.
+    let within = |ramps: [f64; 2], from: f64, to: f64| {
+        let leg = leg(ramps);
+        let breaks: Vec<f64> = leg.breaks().into_iter().filter(|t| (from..=to).contains(t)).collect();
+        slow_down(&peaks(&breaks, false, |t, out| leg.rates(t, out)), &limits, task.hold)
+    };
+    let middle = {
+        let curve = &curved.curve;
+        let breaks: Vec<f64> = curve.nodes().map(|node| curve.parameter(node)).collect();
+        let own_speed = |u: f64, out: &mut Vec<[f64; 3]>| curved.rates(curve.place(u), [1.0, 0.0, 0.0], out);
+        slow_down(&peaks(&breaks, false, own_speed), &limits, task.hold)
+    };
+    let first: Vec<f64> = lengths.iter().map(|r| within([*r, lengths[0]], 0.0, *r)).collect();
+    let last: Vec<f64> = lengths
+        .iter()
+        .map(|r| {
+            let duration = seconds + 0.5 * (lengths[0] + r);
+            within([lengths[0], *r], duration - r, duration)
+        })
+        .collect();
+    let mut best = (f64::INFINITY, [lengths[0]; 2]);
+    for (start, ask_start) in lengths.iter().zip(&first) {
+        for (end, ask_end) in lengths.iter().zip(&last) {
+            let time = middle.max(*ask_start).max(*ask_end) * (seconds + 0.5 * (start + end));
+            if time < best.0 {
+                best = (time, [*start, *end]);
+            }
+        }
+    }
+    let leg = leg(best.1);
+    let peaks = leg.clock_peaks(true);
+    let stretch = slow_down(&peaks, &limits, task.hold);
+    let centre = peaks.rates.last().map_or(0.0, |rates| rates[0]);
+    TimedLeg { stretch, speed_limit: centre / stretch, ..leg }
+}
+
+#[cfg(test)]
+mod tests;

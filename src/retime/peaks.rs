@@ -1,0 +1,178 @@
+//! Largest speed, acceleration and jerk of every actuator over a leg, and the slow-down that restores its limits.
+
+/// Samples in every stretch between two breaks, besides its ends.
+const SAMPLES: usize = 7;
+/// How near a break its one-sided limit is taken, as a share of the stretch.
+const BESIDE: f64 = 1e-9;
+/// Local maxima below this share of the largest sample are not refined: samples are too dense for them to win.
+const WORTH_REFINING: f64 = 0.9;
+/// An acceleration that jumps by less than this share of its peak is rounding, not a jump.
+const JUMP: f64 = 1e-6;
+
+/// Peaks over time, one entry an actuator.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Peaks {
+    /// Largest |speed|, |acceleration|, |jerk|.
+    pub rates: Vec<[f64; 3]>,
+    /// Largest jump of the acceleration at a break: a jerk impulse, where the path's curvature has a kink.
+    pub jumps: Vec<f64>,
+}
+
+/// Finds the peaks of `rates`, which appends each actuator's (speed, acceleration, jerk) at a time; it is smooth between `breaks`
+/// (ascending; doubles are skipped). `refine`: to rounding; otherwise the largest of the samples.
+pub fn peaks(breaks: &[f64], refine: bool, mut rates: impl FnMut(f64, &mut Vec<[f64; 3]>)) -> Peaks {
+    let span = breaks.last().map_or(0.0, |end| end - breaks[0]);
+    let (mut times, mut values) = (Vec::new(), Vec::new());
+    let mut actuators = 0;
+    let mut stretches = 0;
+    for pair in breaks.windows(2) {
+        let length = pair[1] - pair[0];
+        if length <= 1e-12 * span {
+            continue;
+        }
+        stretches += 1;
+        for i in 0..SAMPLES + 2 {
+            let share = (i as f64 / (SAMPLES + 1) as f64).clamp(BESIDE, 1.0 - BESIDE);
+            times.push(pair[0] + share * length);
+            rates(times[times.len() - 1], &mut values);
+        }
+        actuators = values.len() / times.len();
+    }
+    let mut found = Peaks { rates: vec![[0.0; 3]; actuators], jumps: vec![0.0; actuators] };
+    for (i, value) in values.iter().enumerate() {
+        let peak = &mut found.rates[i % actuators];
+        (0..3).for_each(|k| peak[k] = peak[k].max(value[k].abs()));
+    }
+    let per_stretch = SAMPLES + 2;
+    for join in 1..stretches {
+        for actuator in 0..actuators {
+            let at = |sample: usize| values[sample * actuators + actuator][1];
+            let jump = (at(join * per_stretch) - at(join * per_stretch - 1)).abs();
+            if jump > JUMP * found.rates[actuator][1] {
+                found.jumps[actuator] = found.jumps[actuator].max(jump);
+            }
+        }
+    }
+    if refine {
+        let mut scratch = Vec::with_capacity(actuators);
+        for actuator in 0..actuators {
+            for order in 0..3 {
+                let worth = WORTH_REFINING * found.rates[actuator][order];
+                let at = |sample: usize| values[sample * actuators + actuator][order].abs();
+                for stretch in 0..stretches {
+                    for i in 1..=SAMPLES {
+                        let here = stretch * per_stretch + i;
+                        let value = at(here);
+                        if value < worth || value <= 0.0 || value < at(here - 1) || value < at(here + 1) {
+                            continue;
+                        }
+                        let better = maximum([times[here - 1], times[here], times[here + 1]], value, |t| {
+                            scratch.clear();
+                            rates(t, &mut scratch);
+                            scratch[actuator][order].abs()
+                        });
+                        found.rates[actuator][order] = found.rates[actuator][order].max(better);
+                    }
+                }
+            }
+        }
+    }
+    found
+}
+
+/// The largest value of a smooth function with one maximum in `bracket`, by parabolas through the best three points.
+fn maximum(bracket: [f64; 3], middle: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
+    let mut t = bracket;
+    let mut v = [f(t[0]), middle, f(t[2])];
+    for _ in 0..12 {
+        let (left, right) = ((v[1] - v[0]) * (t[2] - t[1]), (v[1] - v[2]) * (t[1] - t[0]));
+        if left + right <= 0.0 {
+            break; // flat
+        }
+        let vertex = t[1] + 0.5 * (left * (t[2] - t[1]) - right * (t[1] - t[0])) / (left + right);
+        if !(vertex > t[0] && vertex < t[2]) || (vertex - t[1]).abs() <= 1e-9 * (t[2] - t[0]) {
+            break;
+        }
+        let value = f(vertex);
+        let gain = value - v[1];
+        let better = gain > 0.0;
+        match (vertex < t[1], better) {
+            (true, true) => (t, v) = ([t[0], vertex, t[1]], [v[0], value, v[1]]),
+            (false, true) => (t, v) = ([t[1], vertex, t[2]], [v[1], value, v[2]]),
+            (true, false) => (t[0], v[0]) = (vertex, value),
+            (false, false) => (t[2], v[2]) = (vertex, value),
+        }
+        if gain.abs() <= 1e-13 * v[1] {
+            break;
+        }
+    }
+    v[1]
+}
+
+/// The least factor `>= 1` by which time must be stretched for every limit (speed, acceleration, jerk; `None`: not checked) to hold.
+///
+/// Speeds fall with the factor, accelerations with its square, jerks with its cube. A jump of acceleration counts as a jerk of
+/// jump/`hold`, which is what held commands make of it; it falls with the square.
+pub fn slow_down(peaks: &Peaks, limits: &[[Option<f64>; 3]], hold: f64) -> f64 {
+    let mut factor = 1.0f64;
+    for ((rates, jump), limit) in peaks.rates.iter().zip(&peaks.jumps).zip(limits) {
+        let over = |k: usize| limit[k].map_or(0.0, |limit| rates[k] / limit);
+        factor = factor.max(over(0)).max(over(1).sqrt()).max(over(2).cbrt());
+        if let (true, Some(jerk)) = (*jump > 0.0, limit[2]) {
+            let excess = |f: f64| rates[2] / f.powi(3) + jump / (hold * f * f) - jerk;
+            let (mut low, mut high) = (factor, factor);
+            while excess(high) > 0.0 {
+                low = high;
+                high *= 2.0;
+            }
+            for _ in 0..50 {
+                let middle = 0.5 * (low + high);
+                if excess(middle) > 0.0 {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            factor = high;
+        }
+    }
+    factor
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn peaks_between_samples_are_found_to_rounding() {
+        let wave = |t: f64, out: &mut Vec<[f64; 3]>| {
+            out.push([(3.0 * t + 0.2).sin(), -2.0 * (t - 0.41).powi(2) + 0.3, (t - 1.3).exp()]);
+            out.push([0.0; 3]);
+        };
+        let found = peaks(&[0.0, 0.2, 0.2, 1.0], true, wave);
+        assert!((found.rates[0][0] - 1.0).abs() < 1e-12);
+        assert!((found.rates[0][1] - 0.3962).abs() < 1e-8, "{found:?}");
+        assert!((found.rates[0][2] - (-0.3f64).exp()).abs() < 1e-8);
+        assert_eq!(found.rates[1], [0.0; 3]);
+        assert_eq!(found.jumps, [0.0, 0.0]);
+    }
+
+    #[test]
+    fn a_jump_of_acceleration_is_found_at_a_break() {
+        let found = peaks(&[0.0, 1.0, 2.0], true, |t, out| out.push([0.0, if t < 1.0 { 0.2 } else { -0.1 }, 0.0]));
+        assert!((found.jumps[0] - 0.3).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_slow_down_restores_each_limit_exactly() {
+        let of = |rates: [f64; 3], jump: f64| Peaks { rates: vec![rates], jumps: vec![jump] };
+        let limits = [[Some(0.5), Some(0.2), Some(0.2)]];
+        assert_eq!(slow_down(&of([0.5, 0.1, 0.2], 0.0), &limits, 0.1), 1.0);
+        assert_eq!(slow_down(&of([1.0, 0.2, 0.2], 0.0), &limits, 0.1), 2.0);
+        assert!((slow_down(&of([0.5, 0.8, 0.2], 0.0), &limits, 0.1) - 2.0).abs() < 1e-15);
+        assert!((slow_down(&of([0.5, 0.2, 1.6], 0.0), &limits, 0.1) - 2.0).abs() < 1e-15);
+        assert_eq!(slow_down(&of([9.0, 9.0, 9.0], 0.0), &[[None; 3]], 0.1), 1.0);
+        let jumping = slow_down(&of([0.0, 0.0, 0.1], 0.08), &limits, 0.1);
+        assert!((0.1 / jumping.powi(3) + 0.8 / jumping.powi(2) - 0.2).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,168 @@
+//! One leg with its clock: what every actuator does at every time since the leg's start.
+
+use crate::geom::Pose2;
+use crate::mission::TimeLaw;
+use crate::trajectory::plane_curve::Place;
+
+use super::convolution::Convolution;
+use super::course::{Course, Curved, Jet, Proportional, compose};
+use super::peaks::{Peaks, peaks};
+use super::warp::Warp;
+
+/// Which quantity of the course is a function of time, and which function.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Clock {
+    /// The share of a proportional course, 0 to 1.
+    Share(Convolution),
+    /// Arc length.
+    ArcLength(Convolution),
+    /// The curve's parameter as a share of its range, scaled to the curve's length: [CONV] Eq. 2 as printed.
+    Printed(Convolution),
+    /// The curve's parameter: its own seconds.
+    Own(Warp),
+}
+
+/// A leg, timed.
+#[derive(Debug, Clone)]
+pub struct TimedLeg {
+    /// What it does.
+    pub course: Course,
+    /// When, before the slow-down.
+    pub clock: Clock,
+    /// The slow-down that restores every limit, `>= 1`.
+    pub stretch: f64,
+    /// The law that a choice was made for; `None` where every law does the same (spins, joints alone, straight lines).
+    pub law: Option<TimeLaw>,
+    /// The centre's speed limit that the profile was made with, m/s; 0 where the base does not drive.
+    pub speed_limit: f64,
+    /// What Eq. 5 or its fixed point took off that limit, m/s.
+    pub compensation: f64,
+}
+
+/// Where a leg is, and the first three derivatives of its parameter in unstretched time.
+enum At<'a> {
+    Share(&'a Proportional, [f64; 4]),
+    Curve { curved: &'a Curved, place: Place, arc: Option<f64>, clock: [f64; 3] },
+}
+
+impl TimedLeg {
+    /// Seconds from rest to rest.
+    pub fn duration(&self) -> f64 {
+        self.stretch * self.clock_duration()
+    }
+
+    /// Pose at a time since the leg's start.
+    pub fn pose(&self, t: f64) -> Pose2 {
+        match self.locate(t / self.stretch) {
+            At::Share(p, [share, ..]) => p.pose(share),
+            At::Curve { curved, place, .. } => curved.pose(place),
+        }
+    }
+
+    /// Wheel travel since the leg's start (left, right, m), then joint values, appended to `out`.
+    pub fn positions(&self, t: f64, out: &mut Vec<f64>) {
+        match self.locate(t / self.stretch) {
+            At::Share(p, [share, ..]) => {
+                out.extend(p.wheel_changes().map(|change| share * change));
+                // Exact at both ends: the goal's joint values are the goal's.
+                let joints = p.joints.iter().zip(&p.joint_changes);
+                out.extend(joints.map(|(from, change)| from + share * change));
+            }
+            At::Curve { curved, place, arc, .. } => {
+                let arc = arc.unwrap_or_else(|| curved.curve.arc(place));
+                out.extend(curved.travel(arc, curved.curve.turn(place)));
+                let dimensions = curved.curve.poly().pieces[0].coefficients.len();
+                out.extend((2..dimensions).map(|d| curved.curve.poly().pieces[place.piece].derivative(d, 0, place.u)));
+            }
+        }
+    }
+
+    /// Speed, acceleration and jerk of (left, right, joints…, centre) at a time since the leg's start, appended to `out`.
+    pub fn rates(&self, t: f64, out: &mut Vec<[f64; 3]>) {
+        let first = out.len();
+        self.clock_rates(t / self.stretch, out);
+        let gamma = self.stretch;
+        for rates in &mut out[first..] {
+            *rates = [rates[0] / gamma, rates[1] / (gamma * gamma), rates[2] / (gamma * gamma * gamma)];
+        }
+    }
+
+    /// Peaks of (left, right, joints…, centre) *before* the slow-down.
+    pub fn clock_peaks(&self, refine: bool) -> Peaks {
+        peaks(&self.clock_breaks(), refine, |t, out| self.clock_rates(t, out))
+    }
+
+    /// Times between which the leg's motion is smooth, since the leg's start; ascending.
+    pub fn breaks(&self) -> Vec<f64> {
+        self.clock_breaks().iter().map(|t| t * self.stretch).collect()
+    }
+
+    fn clock_duration(&self) -> f64 {
+        match &self.clock {
+            Clock::Share(c) | Clock::ArcLength(c) | Clock::Printed(c) => c.duration(),
+            Clock::Own(warp) => warp.duration(),
+        }
+    }
+
+    fn clock_breaks(&self) -> Vec<f64> {
+        let mut breaks: Vec<f64> = match &self.clock {
+            Clock::Share(c) | Clock::ArcLength(c) | Clock::Printed(c) => c.corners().to_vec(),
+            Clock::Own(warp) => warp.corners().to_vec(),
+        };
+        if let Course::Curved(curved) = &self.course {
+            let curve = &curved.curve;
+            breaks.extend(curve.nodes().map(|node| match &self.clock {
+                Clock::Share(c) | Clock::ArcLength(c) => c.time_at(curve.arc(node)),
+                Clock::Printed(c) => c.time_at(curve.parameter(node) / curve.duration() * c.distance()),
+                Clock::Own(warp) => warp.time_at(curve.parameter(node)),
+            }));
+        }
+        breaks.sort_by(f64::total_cmp);
+        breaks
+    }
+
+    fn locate(&self, t: f64) -> At<'_> {
+        match (&self.course, &self.clock) {
+            (Course::Proportional(p), Clock::Share(c) | Clock::ArcLength(c) | Clock::Printed(c)) => {
+                let at = c.at(t);
+                At::Share(p, if c.distance() > 0.0 { at.map(|v| v / c.distance()) } else { at })
+            }
+            (Course::Proportional(p), Clock::Own(_)) => {
+                debug_assert!(false, "a proportional course has no timing of its own");
+                At::Share(p, [0.0; 4])
+            }
+            (Course::Curved(curved), Clock::Share(c) | Clock::ArcLength(c)) => {
+                let [s, v, a, j] = c.at(t);
+                let place = curved.curve.place_at_arc(s);
+                At::Curve { curved, place, arc: Some(s), clock: curved.parameter_rates(place, [v, a, j]) }
+            }
+            (Course::Curved(curved), Clock::Printed(c)) => {
+                let scale = curved.curve.duration() / c.distance();
+                let [u, d1, d2, d3] = c.at(t).map(|v| v * scale);
+                At::Curve { curved, place: curved.curve.place(u), arc: None, clock: [d1, d2, d3] }
+            }
+            (Course::Curved(curved), Clock::Own(warp)) => {
+                let [u, d1, d2, d3] = warp.at(t);
+                At::Curve { curved, place: curved.curve.place(u), arc: None, clock: [d1, d2, d3] }
+            }
+        }
+    }
+
+    fn clock_rates(&self, t: f64, out: &mut Vec<[f64; 3]>) {
+        match self.locate(t) {
+            At::Share(p, [_, d1, d2, d3]) => {
+                let changes = p.wheel_changes().into_iter().chain(p.joint_changes.iter().copied()).chain([p.drive]);
+                out.extend(changes.map(|q| compose([q, 0.0, 0.0], [d1, d2, d3])));
+            }
+            At::Curve { curved, place, clock, .. } => curved.rates(place, clock, out),
+        }
+    }
+
+    /// Position and three derivatives of (left, right, joints…) at a time since the leg's start.
+    pub fn jets(&self, t: f64) -> Vec<Jet> {
+        let (mut positions, mut rates) = (Vec::new(), Vec::new());
+        self.positions(t, &mut positions);
+        self.rates(t, &mut rates);
+        positions.iter().zip(rates).map(|(q, [d1, d2, d3])| [*q, d1, d2, d3]).collect()
+    }
+}
