@@ -312,7 +312,10 @@ mod tests {
         assert_eq!(json["status"], "certified");
         assert_eq!(json["certificate"]["clearance_proven_m"], 0.0512);
         assert_eq!(json["certificate"]["closest"]["link"], "left_blade");
-        assert_eq!(json["limits"][0], json!({"actuator": "wheel_left", "quantity": "jerk", "peak": 0.1, "limit": null}));
+        assert_eq!(
+            json["limits"][0],
+            json!({"actuator": "wheel_left", "quantity": "jerk", "peak": 0.1, "limit": null})
+        );
         assert!(json.get("failure").is_none() && json.get("search").is_none());
         assert_eq!(json["inputs"]["mission"]["blake3"].as_str().map(str::len), Some(64));
     }
@@ -320,7 +323,9 @@ mod tests {
     #[test]
     fn the_schema_describes_every_part_of_the_report() {
         let schema: Value = serde_json::from_str(&json_schema()).expect("our own JSON");
-        for key in ["status", "failure", "inputs", "robot", "map", "search", "trajectory", "initial", "profile", "limits"] {
+        for key in
+            ["status", "failure", "inputs", "robot", "map", "search", "trajectory", "initial", "profile", "limits"]
+        {
             assert!(schema["properties"].get(key).is_some(), "{key}");
         }
     }

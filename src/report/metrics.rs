@@ -142,10 +142,7 @@ type Slope = (f64, f64, f64);
 /// Amounts that base and joints move, with their limits.
 fn slopes(travel: f64, turn: f64, joints: &[f64], robot: &RobotModel) -> Vec<Slope> {
     let base = &robot.base;
-    let mut all = vec![
-        (travel, base.speed, base.acceleration),
-        (turn, base.angular_speed, base.angular_acceleration),
-    ];
+    let mut all = vec![(travel, base.speed, base.acceleration), (turn, base.angular_speed, base.angular_acceleration)];
     for (moved, joint) in joints.iter().zip(&robot.joints) {
         let [speed, acceleration, _] = joint.limits.planning();
         all.push((*moved, speed, acceleration));
@@ -351,11 +348,8 @@ mod tests {
     use crate::trajectory::TrajectorySource;
 
     fn robot() -> RobotModel {
-        let limits = |speed, acceleration| MotionLimits {
-            speed: Some(speed),
-            acceleration: Some(acceleration),
-            jerk: None,
-        };
+        let limits =
+            |speed, acceleration| MotionLimits { speed: Some(speed), acceleration: Some(acceleration), jerk: None };
         RobotModel {
             name: "r".into(),
             wheel_radius: 0.1,

@@ -75,7 +75,7 @@ fn failed(inputs: &SummaryInputs<'_>) -> String {
 
 /// One labelled line, broken at spaces.
 fn line(out: &mut String, label: &str, text: &str) {
-    let mut current = format!("  {label:<11}");
+    let mut current = format!("  {label:<12}");
     let indent = current.len();
     for word in text.split(' ') {
         if current.len() > indent && current.chars().count() + 1 + word.chars().count() > WIDTH {
@@ -94,7 +94,7 @@ fn motion(out: &mut String, report: &Report) {
     let mut parts = Vec::new();
     if let Some(commands) = &report.commands {
         parts.push(format!(
-            "{} s, {} rows of {} s ({})",
+            "{} s in {} rows of {} s ({})",
             figure(commands.duration_s),
             commands.rows,
             commands.sampling_time_s,
@@ -102,7 +102,7 @@ fn motion(out: &mut String, report: &Report) {
         ));
     }
     if let Some(metrics) = report.trajectory.as_ref().and_then(|t| t.metrics) {
-        parts.insert(parts.len().min(1), format!("{} m", figure(metrics.length_m)));
+        parts.insert(0, format!("{} m", figure(metrics.length_m)));
     }
     if !parts.is_empty() {
         line(out, "motion", &parts.join(", "));
@@ -134,7 +134,11 @@ fn clearance(out: &mut String, certificate: &CertificatePart) {
     let proven = match certificate.clearance_proven_m {
         Some(proven) if proven >= super::schema::FAR => "no obstacle anywhere".to_string(),
         Some(proven) => {
-            format!("{} m proven, {} m required: margin {} m", figure(proven), required, figure(proven - required))
+            let margin = match proven - required {
+                short if short < 0.0 => format!("{} m short", figure(-short)),
+                margin => format!("{} m to spare", figure(margin)),
+            };
+            format!("{} m proven, {required} m required: {margin}", figure(proven))
         }
         None => format!("nothing proven, {required} m required"),
     };
@@ -154,12 +158,13 @@ fn clearance(out: &mut String, certificate: &CertificatePart) {
 
 fn goal(out: &mut String, certificate: &CertificatePart) {
     let Some(point) = certificate.end_point_error_m else { return };
-    let mut text = format!("reached within {} mm of {} mm", figure(1e3 * point), 1e3 * END_POINT_TOLERANCE);
+    let degrees = |rad: f64| figure(rad * 180.0 / PI);
+    let (mut missed, mut allowed) = (figure(1e3 * point) + " mm", figure(1e3 * END_POINT_TOLERANCE) + " mm");
     if let Some(heading) = certificate.end_heading_error_rad {
-        let degrees = |rad: f64| rad * 180.0 / PI;
-        let _ = write!(text, " and {}° of {}°", figure(degrees(heading)), figure(degrees(END_ANGLE_TOLERANCE)));
+        missed += &format!(" and {}°", degrees(heading));
+        allowed += &format!(" and {}°", degrees(END_ANGLE_TOLERANCE));
     }
-    line(out, "goal", &(text + " allowed"));
+    line(out, "goal", &format!("reached within {missed}; {allowed} are allowed"));
 }
 
 fn limits(out: &mut String, report: &Report) {
@@ -185,8 +190,8 @@ fn limits(out: &mut String, report: &Report) {
             })
             .collect();
         let label = if i == 0 { "limits" } else { "" };
-        let cells: Vec<String> = cells.iter().map(|c| format!("{c:<28}")).collect();
-        let _ = writeln!(out, "{}", format!("  {label:<11}{actuator:<width$}  {}", cells.join("")).trim_end());
+        let cells: Vec<String> = cells.iter().map(|c| format!("{c:<30}")).collect();
+        let _ = writeln!(out, "{}", format!("  {label:<12}{actuator:<width$}  {}", cells.join("")).trim_end());
     }
     if actuators.len() > ACTUATORS {
         line(out, "", &format!("and {} more in report.json", actuators.len() - ACTUATORS));
@@ -216,7 +221,7 @@ fn path_error(out: &mut String, report: &Report) {
         .or_else(|| report.path_error.iter().find(|r| (r.sampling_time_s - commands.sampling_time_s).abs() < 1e-9));
     if let Some(row) = row {
         let text = format!(
-            "{} mm at most, {} mm RMS, {} mm at the end (held commands of {} s)",
+            "at most {} mm off the path, {} mm RMS, {} mm at the end, at {} s",
             figure(1e3 * row.lateral_max_m),
             figure(1e3 * row.lateral_rms_m),
             figure(1e3 * row.end_point_m),
@@ -228,7 +233,7 @@ fn path_error(out: &mut String, report: &Report) {
 
 fn files(out: &mut String, inputs: &SummaryInputs<'_>) {
     if !inputs.files.is_empty() {
-        line(out, "files", &format!("{} {}", join(inputs.folder, ""), inputs.files.join(" ")));
+        line(out, "files", &format!("{}: {}", join(inputs.folder, ""), inputs.files.join(" ")));
     }
 }
 

@@ -62,8 +62,7 @@ fn report() -> Report {
     });
     let (v_max_mps, v_comp_mps) = (Some(0.5), None);
     report.profile = Some(ProfilePart { time_law: "fixed_point".into(), time_s: 42.3, v_max_mps, v_comp_mps });
-    report.commands =
-        Some(CommandsPart { rows: 424, sampling_time_s: 0.1, sampling: "mean".into(), duration_s: 42.3 });
+    report.commands = Some(CommandsPart { rows: 424, sampling_time_s: 0.1, sampling: "mean".into(), duration_s: 42.3 });
     report.path_error = vec![PathErrorRow {
         sampling_time_s: 0.1,
         sampling: "mean".into(),
@@ -87,7 +86,24 @@ fn a_certified_mission_is_summed_up_on_one_screen() {
     let files = ["commands.csv", "commands.mcap", "commands.d", "path_error.csv", "report.json", "timings.json"];
     let text = text(&report, &files);
     assert!(text.lines().count() <= 24 && text.lines().all(|l| l.chars().count() <= 110));
-    insta::assert_snapshot!(text, @"");
+    insta::assert_snapshot!(text, @r"
+    arch_bridges: CERTIFIED
+
+      motion      16.81 m, 42.3 s in 424 rows of 0.1 s (mean)
+      path        optimised, 14 pieces, 61 iterations, converged, time law fixed_point
+      clearance   0.05118 m proven, 0.05 m required: 0.00118 m to spare
+                  closest at 12.3 s: left_blade is 0.05231 m from the obstacle at (4.03, 4.07, 0.28) m
+      goal        reached within 0.042 mm and 0.000974°; 1 mm and 0.1° are allowed
+      limits      wheel_left   0.4987 of 0.5 m/s, 0% left    0.312 of 0.5 m/s², 37% left   2 of 2 m/s³, 0% left
+                  wheel_right  0.41 of 0.5 m/s, 18% left     0.3 m/s², no limit            1.1 m/s³, no limit
+                  blade        0.61 of 1 rad/s, 39% left
+      path error  at most 0.24 mm off the path, 0.11 mm RMS, 0.042 mm at the end, at 0.1 s
+      files       out/arch_bridges/: commands.csv commands.mcap commands.d path_error.csv report.json
+                  timings.json
+
+    Proven over the model of robot and map; wheel slip and tracking errors are not in it.
+    Next: trajc check out/arch_bridges/commands.csv
+    ");
 }
 
 #[test]
@@ -106,7 +122,20 @@ fn a_refused_certificate_says_what_was_violated_and_by_how_much() {
         Refusal { kind: RefusalKind::Limit, message: "wheel_left reaches 0.55 m/s of 0.5 m/s".into(), time: None },
     ];
     report.judge(&refused);
-    insta::assert_snapshot!(text(&report, &["report.json"]), @"");
+    insta::assert_snapshot!(text(&report, &["report.json"]), @r"
+    arch_bridges: FAILED in certify; no command file
+
+      reason      left_blade comes within 0.0312 m of the obstacle at (4.03, 4.08, 0.28) m at 12.3 s
+                  wheel_left reaches 0.55 m/s of 0.5 m/s
+      motion      16.81 m, 42.3 s in 424 rows of 0.1 s (mean)
+      path        optimised, 14 pieces, 61 iterations, converged, time law fixed_point
+      clearance   0.0312 m proven, 0.05 m required: 0.0188 m short
+                  closest at 12.3 s: left_blade is 0.05231 m from the obstacle at (4.03, 4.07, 0.28) m
+      limits      wheel_left   0.55 of 0.5 m/s, OVER         0.312 of 0.5 m/s², 37% left   2 of 2 m/s³, 0% left
+                  wheel_right  0.41 of 0.5 m/s, 18% left     0.3 m/s², no limit            1.1 m/s³, no limit
+                  blade        0.61 of 1 rad/s, 39% left
+      files       out/arch_bridges/: report.json
+    ");
 }
 
 #[test]
@@ -116,7 +145,14 @@ fn an_unreachable_goal_is_told_with_its_numbers() {
         .number("expanded", 18_321)
         .number("closest_m", 1.25);
     report.fail(&Diagnostics(vec![diagnostic]));
-    insta::assert_snapshot!(text(&report, &["report.json"]), @"");
+    insta::assert_snapshot!(text(&report, &["report.json"]), @r"
+    arch_bridges: FAILED in search; no command file
+
+      reason      no path from start to goal at this resolution
+                  expanded = 18321
+                  closest_m = 1.25
+      files       out/arch_bridges/: report.json
+    ");
 }
 
 #[test]
@@ -125,11 +161,11 @@ fn a_mission_without_a_map_says_that_clearance_was_not_checked() {
     let mut free = certificate();
     (free.clearance_required, free.clearance_proven, free.closest) = (None, None, None);
     report.judge(&free);
-    assert!(text(&report, &[]).contains("clearance  no map: not checked"));
+    assert!(text(&report, &[]).contains("clearance   no map: not checked"));
     free.clearance_required = Some(0.05);
     free.clearance_proven = Some(f64::INFINITY);
     report.judge(&free);
-    assert!(text(&report, &[]).contains("clearance  no obstacle anywhere"));
+    assert!(text(&report, &[]).contains("clearance   no obstacle anywhere"));
 }
 
 #[test]
