@@ -32,7 +32,8 @@ pub struct CsvHeader {
 
 /// Key and value of every line of the head, in the order in which they are written.
 pub(super) fn head(table: &CommandTable, header: &CsvHeader) -> Vec<(&'static str, String)> {
-    let mut head = vec![("format", FORMAT.to_string()), ("mission", plain(&header.mission)), ("robot", plain(&header.robot))];
+    let mut head =
+        vec![("format", FORMAT.to_string()), ("mission", plain(&header.mission)), ("robot", plain(&header.robot))];
     head.extend(header.map.as_ref().map(|map| ("map", plain(map))));
     head.extend([
         ("sampling_time_s", number(table.sampling_time)),
@@ -77,8 +78,15 @@ pub fn write(table: &CommandTable, header: &CsvHeader) -> String {
 
 /// The bytes of `path_error.csv`; an unknown clearance is an empty cell.
 pub fn write_path_error(rows: &[PathErrorRow]) -> String {
-    let columns =
-        ["sampling_time_s", "sampling", "lateral_max_m", "lateral_rms_m", "end_point_m", "end_heading_rad", "clearance_min_m"];
+    let columns = [
+        "sampling_time_s",
+        "sampling",
+        "lateral_max_m",
+        "lateral_rms_m",
+        "end_point_m",
+        "end_heading_rad",
+        "clearance_min_m",
+    ];
     let mut text = line(&columns);
     for row in rows {
         text += &line(&[
@@ -131,7 +139,9 @@ mod tests {
 
     #[test]
     fn every_number_is_the_shortest_that_reads_back() {
-        for (value, text) in [(0.1, "0.1"), (1.0, "1"), (-0.0, "0"), (1e-7, "1e-7"), (1e22, "1e22"), (0.1 + 0.2, "0.30000000000000004")] {
+        for (value, text) in
+            [(0.1, "0.1"), (1.0, "1"), (-0.0, "0"), (1e-7, "1e-7"), (1e22, "1e22"), (0.1 + 0.2, "0.30000000000000004")]
+        {
             assert_eq!(number(value), text);
         }
     }

@@ -185,7 +185,8 @@ impl Reader<'_> {
                 self.fault("commands/head", format!("the head has no `# {key}: …`"), top.clone());
             }
         }
-        let get = |key: &str| found.iter().find(|(k, ..)| *k == key).map(|(_, value, range)| (value.clone(), range.clone()));
+        let get =
+            |key: &str| found.iter().find(|(k, ..)| *k == key).map(|(_, value, range)| (value.clone(), range.clone()));
         let text = |key: &str| get(key).map(|(value, _)| value);
         let sampling_time = get("sampling_time_s").and_then(|found| self.positive("sampling_time_s", found));
         let wheel_radius = get("wheel_radius_m").and_then(|found| self.positive("wheel_radius_m", found));
@@ -238,7 +239,11 @@ impl Reader<'_> {
                 match found {
                     None => self.fault("commands/column", format!("no column `{velocity}`"), range.clone()),
                     Some(_) if joints.iter().any(|j| j.name == joint) => {
-                        self.fault("commands/column", format!("joint `{joint}` has columns in rad and in m"), range.clone());
+                        self.fault(
+                            "commands/column",
+                            format!("joint `{joint}` has columns in rad and in m"),
+                            range.clone(),
+                        );
                     }
                     Some(velocity) => {
                         joints.push(JointColumns { name: joint.to_string(), prismatic, position: at, velocity })
@@ -318,8 +323,10 @@ impl Reader<'_> {
             let message = format!("time_s does not increase: {time} s after {last} s");
             self.fault("commands/time", message, range.clone());
         } else if (time - wanted).abs() > TIME_TOLERANCE {
-            let message =
-                format!("time_s is {time} s, row {k} of a file sampled each {} s is at {wanted} s", table.sampling_time);
+            let message = format!(
+                "time_s is {time} s, row {k} of a file sampled each {} s is at {wanted} s",
+                table.sampling_time
+            );
             self.fault("commands/time", message, range.clone());
         }
         *last = time;
@@ -370,7 +377,9 @@ mod tests {
         let text = write(&table, &header);
         let reversed: String = text
             .lines()
-            .map(|l| if l.starts_with('#') { l.to_string() } else { l.rsplit(',').collect::<Vec<_>>().join(",") } + "\n")
+            .map(
+                |l| if l.starts_with('#') { l.to_string() } else { l.rsplit(',').collect::<Vec<_>>().join(",") } + "\n",
+            )
             .collect();
         assert_eq!(read("c.csv", &reversed), Ok((table, header)));
     }
@@ -455,7 +464,10 @@ mod tests {
     #[test]
     fn a_file_full_of_faults_reports_a_dozen() {
         let text = write(&samples::table(500, &[]), &samples::header()).replace("0.1,", "x,").replace("0.2,", "y,");
-        let text: String = text.lines().map(|l| if l.starts_with(|c: char| c.is_ascii_digit()) { "z\n".into() } else { format!("{l}\n") }).collect();
+        let text: String = text
+            .lines()
+            .map(|l| if l.starts_with(|c: char| c.is_ascii_digit()) { "z\n".into() } else { format!("{l}\n") })
+            .collect();
         assert_eq!(read("c.csv", &text).expect_err("faulty").0.len(), FAULTS);
     }
 
@@ -467,15 +479,15 @@ mod tests {
             joints.retain(|(name, _)| seen.insert(name.clone()));
             let n = joints.len();
             let list = move || proptest::collection::vec(value(), n);
-            let row = (value(), value(), list(), list(), (value(), value(), value())).prop_map(|(l, r, p, v, (x, y, yaw))| {
-                CommandRow {
+            let row = (value(), value(), list(), list(), (value(), value(), value())).prop_map(
+                |(l, r, p, v, (x, y, yaw))| CommandRow {
                     wheel_left: l,
                     wheel_right: r,
                     joint_positions: p,
                     joint_velocities: v,
                     pose: Pose2::new(x, y, yaw),
-                }
-            });
+                },
+            );
             let rows = proptest::collection::vec(row, 1..6);
             (rows, 1e-4..10.0, 1e-3..1.0, 0.01..2.0, 0usize..3).prop_map(move |(rows, dt, radius, track, sampling)| {
                 CommandTable {
