@@ -1,22 +1,23 @@
 //! Reads `commands.mcap` back: what was written by [`super::mcap::write`], or the same re-indexed or re-compressed. Every
 //! checksum there is must hold, and what the topics say must agree: a robot follows one topic, the proof another.
 
+mod container;
+mod message;
+
 use std::collections::BTreeMap;
 
 use ::mcap::McapError;
-use ::mcap::records::{Metadata, Record, op};
-use ::mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-use super::cdr::{CdrError, Reader};
+use super::cdr::CdrError;
 use super::csv::{CsvHeader, FORMAT};
 use super::mcap::{METADATA, topic};
 use crate::command::{CommandRow, CommandTable};
 use crate::diag::{Describe, Diagnostic, Diagnostics};
 use crate::geom::{Pose2, unwrap_near};
 use crate::report::names;
+use container::Contents;
+use message::{MessageError, joint_names, joint_state, pose, skip_header, twist, wheel_speeds};
 
-/// No record is longer than this, so that a length that lies does not take all memory.
-const LONGEST_RECORD: usize = 1 << 30;
 /// Values that two topics both carry may differ by this, relative to the larger of one of them and 1: rounding only.
 const AGREE: f64 = 1e-9;
 /// Stamps may be off the schedule by this, ns.
@@ -215,159 +216,6 @@ fn parse(bytes: &[u8]) -> Result<CommandFile, McapReadError> {
     Ok(CommandFile { table, header, attachments: contents.attachments })
 }
 
-// ---- the container
-
-type Messages = Vec<(u64, Vec<u8>)>;
-
-/// What of a file matters here.
-#[derive(Default)]
-struct Contents {
-    head: Option<BTreeMap<String, String>>,
-    attachments: Vec<Attached>,
-    topics: BTreeMap<u16, String>,
-    /// Log time and bytes of each message, in file order, by channel.
-    messages: BTreeMap<u16, Messages>,
-}
-
-impl Contents {
-    fn read(bytes: &[u8]) -> Result<Self, McapReadError> {
-        if !bytes.starts_with(::mcap::MAGIC) {
-            return Err(McapReadError::NotMcap);
-        }
-        let mut contents = Self::default();
-        let options = LinearReaderOptions::default()
-            .with_emit_chunks(true)
-            .with_record_length_limit(LONGEST_RECORD)
-            .with_validate_data_section_crc(true)
-            .with_validate_summary_section_crc(true);
-        each_record(bytes, options, &mut |opcode, body| match opcode {
-            op::CHUNK => contents.chunk(body),
-            _ => contents.record(opcode, body),
-        })?;
-        Ok(contents)
-    }
-
-    fn chunk(&mut self, body: &[u8]) -> Result<(), McapReadError> {
-        let Record::Chunk { header, data } = ::mcap::parse_record(op::CHUNK, body)? else { return Ok(()) };
-        if header.compression.is_empty() {
-            check_lengths(&data)?;
-        }
-        // A file of nothing but this chunk.
-        let mut alone = vec![op::CHUNK];
-        alone.extend((body.len() as u64).to_le_bytes());
-        alone.extend(body);
-        let options = LinearReaderOptions::default()
-            .with_skip_start_magic(true)
-            .with_skip_end_magic(true)
-            .with_record_length_limit(LONGEST_RECORD)
-            .with_prevalidate_chunk_crcs(true);
-        each_record(&alone, options, &mut |opcode, body| self.record(opcode, body))
-    }
-
-    fn record(&mut self, opcode: u8, body: &[u8]) -> Result<(), McapReadError> {
-        if opcode == op::ATTACHMENT && !attachment_fits(body) {
-            return Err(McapReadError::Overrun);
-        }
-        match ::mcap::parse_record(opcode, body)? {
-            Record::Channel(channel) => {
-                self.topics.insert(channel.id, channel.topic);
-            }
-            Record::Message { header, data } => {
-                self.messages.entry(header.channel_id).or_default().push((header.log_time, data.into_owned()));
-            }
-            Record::Attachment { header, data, .. } => self.attachments.push(Attached {
-                name: header.name,
-                media_type: header.media_type,
-                bytes: data.into_owned(),
-            }),
-            Record::Metadata(Metadata { name, metadata }) if name == METADATA => self.head = Some(metadata),
-            _ => {}
-        }
-        Ok(())
-    }
-
-    fn messages(&self, topic: &str) -> &[(u64, Vec<u8>)] {
-        let channel = self.topics.iter().find(|(_, name)| *name == topic).map(|(id, _)| id);
-        channel.and_then(|id| self.messages.get(id)).map_or(&[], Vec::as_slice)
-    }
-
-    /// Decodes all messages of a topic.
-    fn each<T>(
-        &self,
-        topic: &'static str,
-        wanted: usize,
-        decode: impl Fn(&mut Reader<'_>) -> Result<T, MessageError>,
-    ) -> Result<Vec<T>, McapReadError> {
-        let messages = self.messages(topic);
-        if messages.len() != wanted {
-            return Err(McapReadError::Count { topic, found: messages.len(), wanted });
-        }
-        let decode_one = |bytes: &[u8]| -> Result<T, MessageError> {
-            let mut reader = Reader::new(bytes)?;
-            let value = decode(&mut reader)?;
-            reader.finish()?;
-            Ok(value)
-        };
-        let placed = |row: usize, error| match error {
-            MessageError::Cdr(error) => McapReadError::Message { topic, row, error },
-            MessageError::Content(what) => McapReadError::Content { topic, row, what },
-        };
-        messages.iter().enumerate().map(|(row, (_, bytes))| decode_one(bytes).map_err(|e| placed(row, e))).collect()
-    }
-}
-
-fn each_record(
-    mut bytes: &[u8],
-    options: LinearReaderOptions,
-    visit: &mut dyn FnMut(u8, &[u8]) -> Result<(), McapReadError>,
-) -> Result<(), McapReadError> {
-    let mut reader = LinearReader::new_with_options(options);
-    while let Some(event) = reader.next_event() {
-        match event? {
-            LinearReadEvent::ReadRequest(_) => {
-                // All at once: it is in memory anyway, and a request is not to be trusted.
-                reader.insert(bytes.len()).copy_from_slice(bytes);
-                reader.notify_read(bytes.len());
-                bytes = &[];
-            }
-            LinearReadEvent::Record { data, opcode } => visit(opcode, data)?,
-        }
-    }
-    Ok(())
-}
-
-/// The records of an uncompressed chunk fill it exactly. (The MCAP reader takes that for granted.)
-fn check_lengths(mut chunk: &[u8]) -> Result<(), McapReadError> {
-    while !chunk.is_empty() {
-        let length = chunk.get(1..9).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes);
-        let end = length.and_then(|l| usize::try_from(l).ok()).and_then(|l| l.checked_add(9));
-        chunk = end.and_then(|end| chunk.get(end..)).ok_or(McapReadError::Overrun)?;
-    }
-    Ok(())
-}
-
-/// Whether the parts of an attachment record lie within it. (The MCAP reader takes its last four bytes for granted.)
-fn attachment_fits(body: &[u8]) -> bool {
-    let skip = |body: &mut &[u8], count: usize| match body.split_at_checked(count) {
-        Some((taken, rest)) => {
-            *body = rest;
-            Some(taken.to_vec())
-        }
-        None => None,
-    };
-    let mut rest = body;
-    let mut string = |rest: &mut &[u8]| {
-        let length = skip(rest, 4)?;
-        skip(rest, u32::from_le_bytes(length.try_into().ok()?) as usize)
-    };
-    // Log time, create time; name, media type; length of the data; checksum.
-    skip(&mut rest, 16).is_some()
-        && string(&mut rest).is_some()
-        && string(&mut rest).is_some()
-        && skip(&mut rest, 8).is_some()
-        && rest.len() >= 4
-}
-
 // ---- the head
 
 struct Head<'a> {
@@ -422,92 +270,6 @@ impl Head<'_> {
     }
 }
 
-// ---- the messages
-
-/// Why a message is not what it must be.
-enum MessageError {
-    Cdr(CdrError),
-    Content(&'static str),
-}
-
-impl From<CdrError> for MessageError {
-    fn from(error: CdrError) -> Self {
-        Self::Cdr(error)
-    }
-}
-
-struct JointState {
-    names: Vec<String>,
-    positions: Vec<f64>,
-    velocities: Vec<f64>,
-}
-
-/// Skips a `std_msgs/Header`.
-fn skip_header(r: &mut Reader<'_>) -> Result<(), CdrError> {
-    r.i32()?;
-    r.u32()?;
-    r.string().map(|_| ())
-}
-
-fn finite<const N: usize>(r: &mut Reader<'_>) -> Result<[f64; N], MessageError> {
-    let mut values = [0.0; N];
-    for value in &mut values {
-        *value = r.f64()?;
-    }
-    all_finite(&values)?;
-    Ok(values)
-}
-
-fn all_finite(values: &[f64]) -> Result<(), MessageError> {
-    if values.iter().all(|v| v.is_finite()) { Ok(()) } else { Err(MessageError::Content("a number is not finite")) }
-}
-
-fn joint_names(r: &mut Reader<'_>) -> Result<Vec<String>, CdrError> {
-    r.sequence(|r| r.string().map(str::to_string))
-}
-
-fn wheel_speeds(r: &mut Reader<'_>) -> Result<[f64; 2], MessageError> {
-    let dimensions = r.u32()?;
-    let offset = r.u32()?;
-    if dimensions != 0 || offset != 0 {
-        return Err(MessageError::Content("the layout is not empty"));
-    }
-    let data = r.f64s()?;
-    all_finite(&data)?;
-    data.try_into().map_err(|_| MessageError::Content("must have two wheel speeds: left, right"))
-}
-
-fn joint_state(r: &mut Reader<'_>) -> Result<JointState, MessageError> {
-    skip_header(r)?;
-    let state = JointState { names: joint_names(r)?, positions: r.f64s()?, velocities: r.f64s()? };
-    r.f64s()?;
-    all_finite(&state.positions)?;
-    all_finite(&state.velocities)?;
-    if state.positions.len() != state.names.len() || state.velocities.len() != state.names.len() {
-        return Err(MessageError::Content("names, positions and velocities differ in number"));
-    }
-    Ok(state)
-}
-
-/// x, y and heading of the first transform.
-fn pose(r: &mut Reader<'_>) -> Result<[f64; 3], MessageError> {
-    let transforms = r.sequence(|r| {
-        skip_header(r)?;
-        r.string()?;
-        let mut values = [0.0; 7];
-        for value in &mut values {
-            *value = r.f64()?;
-        }
-        Ok(values)
-    })?;
-    let [x, y, _, i, j, k, w] = *transforms.first().ok_or(MessageError::Content("no transform"))?;
-    all_finite(&[x, y, i, j, k, w])?;
-    if i.hypot(j) > AGREE || (k.hypot(w) - 1.0).abs() > AGREE {
-        return Err(MessageError::Content("the rotation is no unit quaternion about z"));
-    }
-    Ok([x, y, 2.0 * k.atan2(w)])
-}
-
 // ---- what must agree
 
 fn agree(topic: &'static str, row: usize, quantity: &'static str, said: f64, wanted: f64) -> Result<(), McapReadError> {
@@ -534,10 +296,7 @@ fn check_schedule(contents: &Contents, table: &CommandTable) -> Result<(), McapR
 
 /// `/cmd_vel` asks for what the wheels do.
 fn check_twists(contents: &Contents, table: &CommandTable) -> Result<(), McapReadError> {
-    let twists = contents.each(topic::TWIST, table.rows.len(), |r| {
-        skip_header(r)?;
-        finite::<6>(r)
-    })?;
+    let twists = contents.each(topic::TWIST, table.rows.len(), twist)?;
     for (row, [v, y, z, roll, pitch, omega]) in twists.into_iter().enumerate() {
         let (held_v, held_omega) = table.twist(row);
         agree(topic::TWIST, row, "the speed (m/s)", v, held_v)?;

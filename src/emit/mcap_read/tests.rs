@@ -2,7 +2,7 @@ use super::*;
 use crate::emit::mcap::attached;
 use crate::emit::mcap::tests::{MISSION, REPORT, URDF, file};
 use crate::emit::{csv, samples};
-use ::mcap::records::MessageHeader;
+use ::mcap::records::{MessageHeader, Record, op};
 use ::mcap::{Attachment, Compression, WriteOptions, Writer};
 use nalgebra::Isometry3;
 use std::io::Cursor;
