@@ -1,0 +1,353 @@
+//! Reads `commands.csv` back. Columns may come in any order; nothing else is tolerated, since a robot will drive this.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use super::csv::{CsvHeader, FORMAT, joint_columns};
+use crate::command::{CommandRow, CommandTable};
+use crate::diag::{Diagnostic, Diagnostics, Source, Span, nearest};
+use crate::geom::Pose2;
+use crate::report::names;
+
+/// Rows may be off `k * sampling_time` by this, s: rounding of other writers.
+const TIME_TOLERANCE: f64 = 1e-9;
+/// `v_mps` and `omega_rad_s` may be off what the wheels give by this, relative to the larger of it and 1.
+const TWIST_TOLERANCE: f64 = 1e-9;
+/// Faults reported at most: a file of another kind has one in each line.
+const FAULTS: usize = 12;
+
+/// The columns that are no joint's.
+const FIXED: [&str; 8] =
+    ["time_s", "wheel_left_rad_s", "wheel_right_rad_s", "v_mps", "omega_rad_s", "x_m", "y_m", "yaw_rad"];
+/// The keys of the head; `map` may be missing.
+const KEYS: [&str; 9] = [
+    "format",
+    "mission",
+    "robot",
+    "map",
+    "sampling_time_s",
+    "sampling",
+    "wheel_radius_m",
+    "track_width_m",
+    "inputs_blake3",
+];
+
+/// A command file's table and head. `name` is the file's path as the user knows it.
+///
+/// # Errors
+/// With the line each: a head that is not `trajc.commands/1` or lacks a key; missing, unknown or doubled columns; rows with
+/// too few or too many cells; cells that are no finite number; times that do not increase or are not multiples of the
+/// sampling time; `v_mps` or `omega_rad_s` that contradict the wheels.
+pub fn read(name: &str, text: &str) -> Result<(CommandTable, CsvHeader), Diagnostics> {
+    let source = Arc::new(Source { name: name.to_string(), text: text.to_string() });
+    let mut reader = Reader { lines: lines(&source.text), source: &source, faults: Vec::new() };
+    match reader.read() {
+        Some(found) if reader.faults.is_empty() => Ok(found),
+        _ => Err(Diagnostics(reader.faults)),
+    }
+}
+
+/// Byte ranges of the lines that are not blank, without their ends.
+fn lines(text: &str) -> Vec<Range<usize>> {
+    let mut at = 0;
+    let mut lines = Vec::new();
+    for line in text.split_inclusive('\n') {
+        let kept = line.trim_end_matches(['\n', '\r']);
+        if !kept.trim().is_empty() {
+            lines.push(at..at + kept.len());
+        }
+        at += line.len();
+    }
+    lines
+}
+
+struct Reader<'a> {
+    source: &'a Arc<Source>,
+    lines: Vec<Range<usize>>,
+    faults: Vec<Diagnostic>,
+}
+
+/// Values of the head.
+struct Head {
+    header: CsvHeader,
+    sampling_time: f64,
+    sampling: crate::mission::Sampling,
+    wheel_radius: f64,
+    track_width: f64,
+}
+
+/// Where the columns are.
+struct Columns {
+    count: usize,
+    fixed: [usize; FIXED.len()],
+    joints: Vec<JointColumns>,
+}
+
+struct JointColumns {
+    name: String,
+    prismatic: bool,
+    position: usize,
+    velocity: usize,
+}
+
+impl Reader<'_> {
+    fn text(&self, range: &Range<usize>) -> &str {
+        &self.source.text[range.clone()]
+    }
+
+    fn fault(&mut self, code: &'static str, message: String, range: Range<usize>) {
+        self.fault_hint(code, message, range, None);
+    }
+
+    fn fault_hint(&mut self, code: &'static str, message: String, range: Range<usize>, hint: Option<String>) {
+        if self.faults.len() < FAULTS {
+            let mut fault = Diagnostic::error(code, message).at(&Span::new(self.source, range));
+            fault.hint = hint;
+            self.faults.push(fault);
+        }
+    }
+
+    fn read(&mut self) -> Option<(CommandTable, CsvHeader)> {
+        let notes = self.lines.iter().take_while(|l| self.text(l).starts_with('#')).count();
+        let head = self.head(notes);
+        let Some(names) = self.lines.get(notes).cloned() else {
+            let end = self.source.text.len();
+            self.fault("commands/no-columns", "the file ends before the column names".into(), end..end);
+            return None;
+        };
+        let columns = self.columns(names)?;
+        let head = head?;
+        let mut table = CommandTable {
+            sampling_time: head.sampling_time,
+            sampling: head.sampling,
+            wheel_radius: head.wheel_radius,
+            track_width: head.track_width,
+            joints: columns.joints.iter().map(|j| (j.name.clone(), j.prismatic)).collect(),
+            rows: Vec::with_capacity(self.lines.len() - notes - 1),
+        };
+        let mut last = f64::NEG_INFINITY;
+        for i in notes + 1..self.lines.len() {
+            let cells = self.cells(i, columns.count);
+            if self.faults.len() >= FAULTS {
+                break;
+            }
+            if let Some(cells) = cells {
+                self.row(i, &cells, &columns, &mut table, &mut last);
+            }
+        }
+        if table.rows.is_empty() {
+            let end = self.source.text.len();
+            self.fault("commands/no-rows", "the file has no row".into(), end..end);
+        }
+        Some((table, head.header))
+    }
+
+    fn head(&mut self, notes: usize) -> Option<Head> {
+        let mut found: Vec<(&'static str, String, Range<usize>)> = Vec::new();
+        for i in 0..notes {
+            let range = self.lines[i].clone();
+            let line = self.text(&range)[1..].to_string();
+            let Some((key, value)) = line.split_once(':') else {
+                self.fault("commands/head", "a line of the head must be `# key: value`".into(), range);
+                continue;
+            };
+            let (key, value) = (key.trim(), value.trim().to_string());
+            match KEYS.iter().find(|known| **known == key) {
+                None => {
+                    let hint = nearest(key, KEYS).map(|known| format!("did you mean `{known}`?"));
+                    self.fault_hint("commands/head", format!("unknown key `{key}`"), range, hint);
+                }
+                Some(known) if found.iter().any(|(k, ..)| k == known) => {
+                    self.fault("commands/head", format!("`{key}` is given twice"), range);
+                }
+                Some(known) => found.push((known, value, range)),
+            }
+        }
+        let top = self.lines.first().cloned().unwrap_or(0..0);
+        let is_ours = |value: &String| value == FORMAT;
+        match found.iter().find(|(key, ..)| *key == "format").cloned() {
+            None => {
+                let hint = Some("commands.csv is written by `trajc compile`".to_string());
+                let message = format!("this is no command file: no line `# format: {FORMAT}` at its top");
+                // What follows from that is no news.
+                self.faults.clear();
+                self.fault_hint("commands/format", message, top, hint);
+                return None;
+            }
+            Some((_, value, range)) if !is_ours(&value) => {
+                self.faults.clear();
+                self.fault("commands/format", format!("format is `{value}`, this program reads `{FORMAT}`"), range);
+                return None;
+            }
+            Some(_) => {}
+        }
+        for key in KEYS.into_iter().filter(|key| *key != "map") {
+            if !found.iter().any(|(k, ..)| *k == key) {
+                self.fault("commands/head", format!("the head has no `# {key}: …`"), top.clone());
+            }
+        }
+        let get =
+            |key: &str| found.iter().find(|(k, ..)| *k == key).map(|(_, value, range)| (value.clone(), range.clone()));
+        let text = |key: &str| get(key).map(|(value, _)| value);
+        let sampling_time = get("sampling_time_s").and_then(|found| self.positive("sampling_time_s", found));
+        let wheel_radius = get("wheel_radius_m").and_then(|found| self.positive("wheel_radius_m", found));
+        let track_width = get("track_width_m").and_then(|found| self.positive("track_width_m", found));
+        let sampling = get("sampling").and_then(|(value, range)| {
+            let sampling = names::parse_sampling(&value);
+            if sampling.is_none() {
+                let known = names::SAMPLINGS.map(|(_, name)| name).join(", ");
+                self.fault("commands/head", format!("sampling is `{value}`, must be one of {known}"), range);
+            }
+            sampling
+        });
+        Some(Head {
+            header: CsvHeader {
+                mission: text("mission")?,
+                robot: text("robot")?,
+                map: text("map"),
+                inputs_blake3: text("inputs_blake3")?,
+            },
+            sampling_time: sampling_time?,
+            sampling: sampling?,
+            wheel_radius: wheel_radius?,
+            track_width: track_width?,
+        })
+    }
+
+    fn positive(&mut self, key: &str, (value, range): (String, Range<usize>)) -> Option<f64> {
+        let number = value.parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0);
+        if number.is_none() {
+            self.fault("commands/head", format!("{key} is `{value}`, must be a number above 0"), range);
+        }
+        number
+    }
+
+    fn columns(&mut self, range: Range<usize>) -> Option<Columns> {
+        let line = self.text(&range).to_string();
+        let mut reader = ::csv::ReaderBuilder::new().has_headers(false).from_reader(line.as_bytes());
+        let names: Vec<String> = match reader.records().next() {
+            Some(Ok(record)) => record.iter().map(|name| name.trim().to_string()).collect(),
+            _ => Vec::new(),
+        };
+        let before = self.faults.len();
+        let mut joints: Vec<JointColumns> = Vec::new();
+        for (at, name) in names.iter().enumerate() {
+            if names[..at].contains(name) {
+                self.fault("commands/column", format!("column `{name}` is there twice"), range.clone());
+            } else if let Some((joint, prismatic)) = position_column(name) {
+                let [_, velocity] = joint_columns(joint, prismatic);
+                let found = names.iter().position(|n| *n == velocity);
+                match found {
+                    None => self.fault("commands/column", format!("no column `{velocity}`"), range.clone()),
+                    Some(_) if joints.iter().any(|j| j.name == joint) => {
+                        self.fault(
+                            "commands/column",
+                            format!("joint `{joint}` has columns in rad and in m"),
+                            range.clone(),
+                        );
+                    }
+                    Some(velocity) => {
+                        joints.push(JointColumns { name: joint.to_string(), prismatic, position: at, velocity })
+                    }
+                }
+            } else if !FIXED.contains(&name.as_str()) && !self.known_velocity(name, &names, &range) {
+                let hint = nearest(name, FIXED).map(|known| format!("did you mean `{known}`?"));
+                self.fault_hint("commands/column", format!("unknown column `{name}`"), range.clone(), hint);
+            }
+        }
+        let fixed = FIXED.map(|name| {
+            names.iter().position(|n| n == name).unwrap_or_else(|| {
+                self.fault("commands/column", format!("no column `{name}`"), range.clone());
+                0
+            })
+        });
+        (self.faults.len() == before).then_some(Columns { count: names.len(), fixed, joints })
+    }
+
+    /// Whether this is a joint's velocity; without its position column that is a fault of its own.
+    fn known_velocity(&mut self, name: &str, names: &[String], range: &Range<usize>) -> bool {
+        let Some(rest) = name.strip_prefix("joint.") else { return false };
+        for (suffix, prismatic) in [(".vel_rad_s", false), (".vel_mps", true)] {
+            if let Some(joint) = rest.strip_suffix(suffix).filter(|joint| !joint.is_empty()) {
+                let [position, _] = joint_columns(joint, prismatic);
+                if !names.contains(&position) {
+                    self.fault("commands/column", format!("no column `{position}`"), range.clone());
+                }
+                return true;
+            }
+        }
+        false
+    }
+
+    /// The finite numbers of line `i`.
+    fn cells(&mut self, i: usize, count: usize) -> Option<Vec<f64>> {
+        let range = self.lines[i].clone();
+        let mut at = range.start;
+        let mut ranges = Vec::with_capacity(count);
+        for cell in self.text(&range).split(',') {
+            ranges.push(at..at + cell.len());
+            at += cell.len() + 1;
+        }
+        if ranges.len() != count {
+            let message = format!("the row has {} cells, the header {count}", ranges.len());
+            self.fault("commands/row", message, range);
+            return None;
+        }
+        let mut values = Vec::with_capacity(count);
+        for range in ranges {
+            let cell = self.text(&range).trim();
+            match cell.parse::<f64>() {
+                Ok(value) if value.is_finite() => values.push(value),
+                _ => {
+                    let message = format!("`{cell}` is no finite number");
+                    self.fault("commands/number", message, range);
+                    return None;
+                }
+            }
+        }
+        Some(values)
+    }
+
+    fn row(&mut self, i: usize, cells: &[f64], columns: &Columns, table: &mut CommandTable, last: &mut f64) {
+        let range = self.lines[i].clone();
+        let [time, left, right, v, omega, x, y, yaw] = columns.fixed.map(|at| cells[at]);
+        let k = table.rows.len();
+        table.rows.push(CommandRow {
+            wheel_left: left,
+            wheel_right: right,
+            joint_positions: columns.joints.iter().map(|j| cells[j.position]).collect(),
+            joint_velocities: columns.joints.iter().map(|j| cells[j.velocity]).collect(),
+            pose: Pose2::new(x, y, yaw),
+        });
+        let wanted = table.time(k);
+        if time <= *last {
+            let message = format!("time_s does not increase: {time} s after {last} s");
+            self.fault("commands/time", message, range.clone());
+        } else if (time - wanted).abs() > TIME_TOLERANCE {
+            let message = format!(
+                "time_s is {time} s, row {k} of a file sampled each {} s is at {wanted} s",
+                table.sampling_time
+            );
+            self.fault("commands/time", message, range.clone());
+        }
+        *last = time;
+        let (held_v, held_omega) = table.twist(k);
+        for (name, said, held) in [("v_mps", v, held_v), ("omega_rad_s", omega, held_omega)] {
+            let agree = (said - held).abs() <= TWIST_TOLERANCE * held.abs().max(1.0);
+            if !agree {
+                let message = format!("{name} is {said}, but the wheels of this row give {held}");
+                self.fault("commands/contradiction", message, range.clone());
+            }
+        }
+    }
+}
+
+/// The joint of a position column, and whether it is prismatic.
+fn position_column(name: &str) -> Option<(&str, bool)> {
+    let rest = name.strip_prefix("joint.")?;
+    let found = rest.strip_suffix(".pos_rad").map(|j| (j, false)).or(rest.strip_suffix(".pos_m").map(|j| (j, true)));
+    found.filter(|(joint, _)| !joint.is_empty())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,332 @@
+//! From the stages' nouns to the parts of [`Report`].
+
+use serde_json::{Map, Value, json};
+
+use super::schema::*;
+use super::{Metrics, Report, Status, names};
+use crate::certify::{Certificate, Closest, LimitCheck, Refusal, RefusalKind};
+use crate::command::CommandTable;
+use crate::diag::{Diagnostics, Severity};
+use crate::map::VoxelMap;
+use crate::robot::{MovingJoint, RobotModel};
+use crate::search::SearchPath;
+use crate::trajectory::{Leg, Trajectory};
+
+/// JSON knows neither NaN nor infinity.
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+impl Report {
+    /// A report of a run that has read these files and nothing more. It has failed until [`Report::judge`] says otherwise.
+    pub fn new(inputs: InputsPart) -> Self {
+        Self {
+            schema: SCHEMA.to_string(),
+            status: Status::Failed,
+            failure: None,
+            inputs,
+            robot: None,
+            map: None,
+            search: None,
+            trajectory: None,
+            initial: None,
+            profile: None,
+            limits: Vec::new(),
+            commands: None,
+            certificate: None,
+            path_error: Vec::new(),
+        }
+    }
+
+    /// Takes over the certificate: its figures, its limits, and the verdict.
+    pub fn judge(&mut self, certificate: &Certificate) {
+        self.certificate = Some(certificate.into());
+        self.limits = certificate.limits.iter().map(LimitPart::from).collect();
+        self.failure = refusal(&certificate.refusals);
+        self.status = if self.failure.is_none() { Status::Certified } else { Status::Failed };
+    }
+
+    /// Records why the run failed.
+    pub fn fail(&mut self, diagnostics: &Diagnostics) {
+        self.status = Status::Failed;
+        self.failure = Some(diagnostics.into());
+    }
+}
+
+fn refusal(refusals: &[Refusal]) -> Option<Failure> {
+    let first = refusals.first()?;
+    let listed = refusals.iter().map(|r| {
+        let mut entry = Map::new();
+        entry.insert("kind".into(), refusal_kind(r.kind).into());
+        entry.insert("message".into(), r.message.as_str().into());
+        if let Some(time) = r.time.and_then(finite) {
+            entry.insert("time_s".into(), time.into());
+        }
+        Value::Object(entry)
+    });
+    let mut numbers = Map::new();
+    numbers.insert("refusals".into(), listed.collect());
+    let reason = refusals.iter().map(|r| r.message.as_str()).collect::<Vec<_>>().join("; ");
+    let code = format!("certify/{}", refusal_kind(first.kind));
+    Some(Failure { stage: "certify".into(), reason, code, numbers })
+}
+
+fn refusal_kind(kind: RefusalKind) -> &'static str {
+    match kind {
+        RefusalKind::Clearance => "clearance",
+        RefusalKind::Limit => "limit",
+        RefusalKind::Position => "position",
+        RefusalKind::End => "end",
+        RefusalKind::Table => "table",
+    }
+}
+
+/// The first fault of the worst kind names the stage and the code; all messages make the reason.
+impl From<&Diagnostics> for Failure {
+    fn from(diagnostics: &Diagnostics) -> Self {
+        let worst = diagnostics.severity();
+        let code = diagnostics.0.iter().find(|d| d.severity == worst).map_or("trajc/unknown", |d| d.code);
+        let mut numbers = Map::new();
+        for (key, value) in diagnostics.0.iter().flat_map(|d| &d.numbers) {
+            // `stage`, `reason` and `code` are this struct's own keys.
+            if !matches!(*key, "stage" | "reason" | "code") && !numbers.contains_key(*key) {
+                numbers.insert((*key).to_string(), value.clone());
+            }
+        }
+        if worst == Severity::BadInput {
+            let places: Vec<Value> = diagnostics.0.iter().filter_map(place).collect();
+            if !places.is_empty() {
+                numbers.entry("places").or_insert(places.into());
+            }
+        }
+        Self {
+            stage: code.split('/').next().unwrap_or_default().to_string(),
+            reason: diagnostics.0.iter().map(|d| d.message.as_str()).collect::<Vec<_>>().join("; "),
+            code: code.to_string(),
+            numbers,
+        }
+    }
+}
+
+fn place(diagnostic: &crate::diag::Diagnostic) -> Option<Value> {
+    if let Some(span) = &diagnostic.at {
+        let before = &span.source.text.as_bytes()[..span.range.start];
+        let line = 1 + before.iter().filter(|b| **b == b'\n').count();
+        return Some(json!({ "file": span.source.name, "line": line }));
+    }
+    diagnostic.file.as_ref().map(|file| json!({ "file": file }))
+}
+
+impl InputFile {
+    /// A file by its path as the mission spells it, and its bytes.
+    pub fn new(path: impl Into<String>, bytes: &[u8]) -> Self {
+        Self { path: path.into(), blake3: blake3::hash(bytes).to_hex().to_string() }
+    }
+}
+
+impl From<&RobotModel> for RobotPart {
+    fn from(robot: &RobotModel) -> Self {
+        Self {
+            name: robot.name.clone(),
+            wheel_radius_m: robot.wheel_radius,
+            track_width_m: robot.track_width,
+            joints: robot.joints.iter().map(JointPart::from).collect(),
+            shapes: robot.shapes.len(),
+        }
+    }
+}
+
+impl From<&MovingJoint> for JointPart {
+    fn from(joint: &MovingJoint) -> Self {
+        Self {
+            name: joint.name.clone(),
+            prismatic: joint.prismatic,
+            lower: finite(joint.lower),
+            upper: finite(joint.upper),
+            speed: joint.limits.speed,
+            acceleration: joint.limits.acceleration,
+            jerk: joint.limits.jerk,
+        }
+    }
+}
+
+impl From<&VoxelMap> for MapPart {
+    fn from(map: &VoxelMap) -> Self {
+        Self {
+            dims: map.dims,
+            resolution_m: map.resolution,
+            occupied: map.occupied_count(),
+            origin_m: map.origin,
+            points: map.statistics.points,
+            not_finite: map.statistics.not_finite,
+            cut: map.statistics.cut,
+            unknown: map.statistics.unknown,
+        }
+    }
+}
+
+impl From<&SearchPath> for SearchPart {
+    fn from(path: &SearchPath) -> Self {
+        Self { expanded: path.expanded, length_m: path.length() }
+    }
+}
+
+impl TrajectoryPart {
+    /// `metrics`: of the optimiser's own timing where it made the trajectory, else of the driven path; see
+    /// [`super::metrics`].
+    pub fn new(trajectory: &Trajectory, metrics: Option<Metrics>) -> Self {
+        let pieces = |leg: &Leg| match leg {
+            Leg::Drive(drive) => drive.curve.pieces.len(),
+            Leg::Still(_) => 0,
+        };
+        Self {
+            source: names::source(trajectory.source).into(),
+            pieces: trajectory.legs.iter().map(pieces).sum(),
+            iterations: trajectory.optimiser.map(|o| o.iterations),
+            ending: trajectory.optimiser.map(|o| names::ending(o.ending).into()),
+            metrics,
+        }
+    }
+}
+
+impl From<&CommandTable> for CommandsPart {
+    fn from(table: &CommandTable) -> Self {
+        Self {
+            rows: table.rows.len(),
+            sampling_time_s: table.sampling_time,
+            sampling: names::sampling(table.sampling).into(),
+            duration_s: table.duration(),
+        }
+    }
+}
+
+impl From<&Certificate> for CertificatePart {
+    fn from(certificate: &Certificate) -> Self {
+        let proven = certificate.clearance_proven.map(|c| c.min(FAR));
+        Self {
+            clearance_required_m: certificate.clearance_required.and_then(finite),
+            clearance_proven_m: proven.and_then(finite),
+            end_point_error_m: finite(certificate.end_point_error),
+            end_heading_error_rad: certificate.end_heading_error.and_then(finite),
+            limits_hold: certificate.limits_hold,
+            closest: certificate.closest.as_ref().and_then(closest),
+        }
+    }
+}
+
+fn closest(closest: &Closest) -> Option<ClosestPart> {
+    Some(ClosestPart {
+        time_s: finite(closest.time)?,
+        link: closest.link.clone(),
+        obstacle: closest.obstacle.map(|b| BoxPart { min: b.min, max: b.max }),
+        distance_m: finite(closest.distance)?,
+    })
+}
+
+impl From<&LimitCheck> for LimitPart {
+    fn from(check: &LimitCheck) -> Self {
+        Self {
+            actuator: check.actuator.clone(),
+            quantity: check.quantity.into(),
+            peak: finite(check.peak),
+            limit: check.limit.and_then(finite),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diag::{Diagnostic, Source, Span};
+    use crate::geom::Aabb;
+    use std::sync::Arc;
+
+    fn certificate() -> Certificate {
+        Certificate {
+            clearance_required: Some(0.05),
+            clearance_proven: Some(0.0512),
+            closest: Some(Closest {
+                time: 12.3,
+                link: "left_blade".into(),
+                obstacle: Some(Aabb { min: [4.0, 4.05, 0.25], max: [4.05, 4.1, 0.3] }),
+                distance: 0.0523,
+            }),
+            end_point_error: 4e-5,
+            end_heading_error: None,
+            limits: vec![LimitCheck { actuator: "wheel_left".into(), quantity: "jerk", peak: 0.1, limit: None }],
+            limits_hold: true,
+            refusals: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_report_has_failed_until_a_certificate_without_refusals_says_otherwise() {
+        let mut report = Report::new(InputsPart::default());
+        assert_eq!(report.status, Status::Failed);
+        report.judge(&certificate());
+        assert_eq!((report.status, report.failure.is_none()), (Status::Certified, true));
+        let message = "wheel_left passes 0.5 m/s".to_string();
+        let refusals = vec![Refusal { kind: RefusalKind::Limit, message, time: Some(1.5) }];
+        report.judge(&Certificate { refusals, ..certificate() });
+        assert_eq!(report.status, Status::Failed);
+        let failure = report.failure.expect("refused");
+        assert_eq!((failure.stage.as_str(), failure.code.as_str()), ("certify", "certify/limit"));
+        assert_eq!(failure.numbers["refusals"][0]["time_s"], 1.5);
+    }
+
+    #[test]
+    fn numbers_of_a_failure_lie_beside_its_reason_and_cannot_replace_it() {
+        let source = Arc::new(Source { name: "m.yaml".into(), text: "a\nb: 1\n".into() });
+        let diagnostics = Diagnostics(vec![
+            Diagnostic::failure("search/exhausted", "no path").number("gap_m", 0.4).number("stage", "x"),
+            Diagnostic::error("mission/key", "unknown key").at(&Span::new(&source, 2..3)),
+        ]);
+        let value = serde_json::to_value(Failure::from(&diagnostics)).expect("plain");
+        assert_eq!(value["stage"], "mission");
+        assert_eq!(value["code"], "mission/key");
+        assert_eq!(value["reason"], "no path; unknown key");
+        assert_eq!(value["gap_m"], 0.4);
+        assert_eq!(value["places"], json!([{ "file": "m.yaml", "line": 2 }]));
+    }
+
+    #[test]
+    fn no_number_in_the_json_is_nan_or_infinite() {
+        let mut broken = certificate();
+        broken.clearance_proven = Some(f64::INFINITY);
+        broken.end_point_error = f64::NAN;
+        broken.limits[0].peak = f64::NAN;
+        let part = CertificatePart::from(&broken);
+        assert_eq!(part.clearance_proven_m, Some(FAR), "no obstacle at all is still a lower bound");
+        assert_eq!(part.end_point_error_m, None);
+        assert_eq!(LimitPart::from(&broken.limits[0]).peak, None);
+        broken.clearance_proven = Some(f64::NEG_INFINITY);
+        assert_eq!(CertificatePart::from(&broken).clearance_proven_m, None);
+    }
+
+    #[test]
+    fn the_json_has_the_names_of_the_contract() {
+        let mut report = Report::new(InputsPart { mission: InputFile::new("m.yaml", b"x"), ..InputsPart::default() });
+        report.judge(&certificate());
+        let json: Value = serde_json::from_str(&report.to_json()).expect("our own JSON");
+        assert_eq!(json["schema"], "trajc.report/1");
+        assert_eq!(json["status"], "certified");
+        assert_eq!(json["certificate"]["clearance_proven_m"], 0.0512);
+        assert_eq!(json["certificate"]["closest"]["link"], "left_blade");
+        assert_eq!(
+            json["limits"][0],
+            json!({"actuator": "wheel_left", "quantity": "jerk", "peak": 0.1, "limit": null})
+        );
+        assert!(json.get("failure").is_none() && json.get("search").is_none());
+        assert_eq!(json["inputs"]["mission"]["blake3"].as_str().map(str::len), Some(64));
+    }
+
+    #[test]
+    fn the_schema_describes_every_part_of_the_report() {
+        let schema: Value = serde_json::from_str(&json_schema()).expect("our own JSON");
+        for key in
+            ["status", "failure", "inputs", "robot", "map", "search", "trajectory", "initial", "profile", "limits"]
+        {
+            assert!(schema["properties"].get(key).is_some(), "{key}");
+        }
+    }
+}

@@ -1,0 +1,297 @@
+//! `report.json`, schema `trajc.report/1`: names and nesting as other programs read them. A part that a run did not reach is
+//! absent; no number is ever NaN or infinite.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{Metrics, PathErrorRow};
+
+/// The value of `schema`.
+pub const SCHEMA: &str = "trajc.report/1";
+
+/// Everything known about one run of a mission. Starts as `failed` and is `certified` only by [`Report::judge`].
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Report {
+    /// Always `trajc.report/1`.
+    pub schema: String,
+    /// The verdict.
+    pub status: Status,
+    /// Why there are no commands; absent when certified.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub failure: Option<Failure>,
+    /// The files that were read.
+    pub inputs: InputsPart,
+    /// The robot as understood.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub robot: Option<RobotPart>,
+    /// The map as understood.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub map: Option<MapPart>,
+    /// The search.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub search: Option<SearchPart>,
+    /// The trajectory that the commands follow.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trajectory: Option<TrajectoryPart>,
+    /// The search's lattice path, before anything smoothed it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub initial: Option<InitialPart>,
+    /// The time law.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub profile: Option<ProfilePart>,
+    /// Peaks of every actuator as written, against its limits.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub limits: Vec<LimitPart>,
+    /// The command table.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub commands: Option<CommandsPart>,
+    /// What was proven.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub certificate: Option<CertificatePart>,
+    /// Path error by sampling time.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub path_error: Vec<PathErrorRow>,
+}
+
+/// The verdict on a mission.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    /// Command files are written and proven.
+    Certified,
+    /// No command file exists.
+    Failed,
+}
+
+/// Why a run failed.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Failure {
+    /// The stage that failed: `mission`, `robot`, `map`, `search`, `retime`, `certify`, …
+    pub stage: String,
+    /// One sentence, or several, for a person.
+    pub reason: String,
+    /// Stable identifier, such as `search/exhausted`.
+    pub code: String,
+    /// Figures that explain it, by name.
+    #[serde(flatten)]
+    pub numbers: serde_json::Map<String, serde_json::Value>,
+}
+
+/// The files that were read.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
+pub struct InputsPart {
+    /// The mission.
+    pub mission: InputFile,
+    /// robot.yaml, or the URDF where the mission names one alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub robot: Option<InputFile>,
+    /// The map.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub map: Option<InputFile>,
+    /// Files that those name: URDF, meshes, images, a path.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub other: Vec<InputFile>,
+}
+
+/// A file that was read.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, JsonSchema)]
+pub struct InputFile {
+    /// As the mission spells it.
+    pub path: String,
+    /// Of its bytes, hexadecimal.
+    pub blake3: String,
+}
+
+/// The robot as understood.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct RobotPart {
+    /// Its name.
+    pub name: String,
+    /// m.
+    pub wheel_radius_m: f64,
+    /// Distance between the driving wheels, m.
+    pub track_width_m: f64,
+    /// The moving joints.
+    pub joints: Vec<JointPart>,
+    /// Number of collision shapes.
+    pub shapes: usize,
+}
+
+/// A moving joint; `null`: given nowhere. Units: rad or, when prismatic, m.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct JointPart {
+    /// URDF name.
+    pub name: String,
+    /// Slides instead of turning.
+    pub prismatic: bool,
+    /// Least position.
+    pub lower: Option<f64>,
+    /// Greatest position.
+    pub upper: Option<f64>,
+    /// Per second.
+    pub speed: Option<f64>,
+    /// Per second squared.
+    pub acceleration: Option<f64>,
+    /// Per second cubed.
+    pub jerk: Option<f64>,
+}
+
+/// The map as understood.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct MapPart {
+    /// Cells along x, y, z.
+    pub dims: [usize; 3],
+    /// Size of a cell, m.
+    pub resolution_m: f64,
+    /// Occupied cells.
+    pub occupied: usize,
+    /// Lower corner of the grid, m.
+    pub origin_m: [f64; 3],
+    /// Points in the file.
+    pub points: usize,
+    /// Points skipped because a coordinate is not finite.
+    pub not_finite: usize,
+    /// Points or voxels outside `height_m`.
+    pub cut: usize,
+    /// Cells occupied only because they are unknown.
+    pub unknown: usize,
+}
+
+/// The search.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct SearchPart {
+    /// States expanded.
+    pub expanded: usize,
+    /// Length of the path found, m.
+    pub length_m: f64,
+}
+
+/// The trajectory that the commands follow.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct TrajectoryPart {
+    /// `optimised`, `search` (the fall-back) or `given`.
+    pub source: String,
+    /// Polynomial pieces.
+    pub pieces: usize,
+    /// Iterations of the optimiser.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub iterations: Option<usize>,
+    /// How the optimiser ended: `converged`, `iteration_limit`, `line_search_stalled`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ending: Option<String>,
+    /// Of the optimiser's own timing; with `search` and `given` of the driven path.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub metrics: Option<Metrics>,
+}
+
+/// The search's lattice path.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct InitialPart {
+    /// Timed by trapezoids of speed.
+    pub metrics: Metrics,
+}
+
+/// The time law.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ProfilePart {
+    /// Which law timed the path (`auto` says which it took).
+    pub time_law: String,
+    /// After slow-down and rounding up to the sampling time, s.
+    pub time_s: f64,
+    /// Speed limit of the law, m/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub v_max_mps: Option<f64>,
+    /// Speed limit after compensation for curvature, m/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub v_comp_mps: Option<f64>,
+}
+
+/// One actuator's peak against its limit; wheels in m/s at the rim, joints in rad or m.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct LimitPart {
+    /// `wheel_left`, `wheel_right`, or the joint's name.
+    pub actuator: String,
+    /// `speed`, `acceleration` or `jerk`.
+    pub quantity: String,
+    /// Largest magnitude; `null`: not a number.
+    pub peak: Option<f64>,
+    /// `null`: given nowhere, not checked.
+    pub limit: Option<f64>,
+}
+
+/// The command table.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct CommandsPart {
+    /// Rows, the last one at rest.
+    pub rows: usize,
+    /// Seconds a row is held.
+    pub sampling_time_s: f64,
+    /// `mean`, `instant` or `tracked`.
+    pub sampling: String,
+    /// Time of the last row, s.
+    pub duration_s: f64,
+}
+
+/// What was proven.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct CertificatePart {
+    /// m; absent without a map.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clearance_required_m: Option<f64>,
+    /// A lower bound of the true clearance, m; absent without a map. Where nothing is near, [`FAR`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clearance_proven_m: Option<f64>,
+    /// m; `null`: not a number.
+    pub end_point_error_m: Option<f64>,
+    /// rad; absent where the goal leaves the heading open.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub end_heading_error_rad: Option<f64>,
+    /// Whether no limit is exceeded.
+    pub limits_hold: bool,
+    /// The closest approach found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub closest: Option<ClosestPart>,
+}
+
+/// What is written for a clearance without bound, m: JSON has no infinity, and a lower bound may be any smaller number.
+pub const FAR: f64 = 1e6;
+
+/// The closest approach found.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ClosestPart {
+    /// s.
+    pub time_s: f64,
+    /// URDF link.
+    pub link: String,
+    /// The obstacle's box; absent: unseen space beyond the map.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub obstacle: Option<BoxPart>,
+    /// Distance at that instant, m; not positive: overlap.
+    pub distance_m: f64,
+}
+
+/// An axis-aligned box, m.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct BoxPart {
+    /// Lower corner.
+    pub min: [f64; 3],
+    /// Upper corner.
+    pub max: [f64; 3],
+}
+
+impl Report {
+    /// The bytes of `report.json`: indented, ends in a newline, keys in the order of this struct.
+    pub fn to_json(&self) -> String {
+        let mut text = serde_json::to_string_pretty(self).expect("string keys and finite or null numbers only");
+        text.push('\n');
+        text
+    }
+}
+
+/// JSON Schema of `report.json` for editors and validators, as indented text.
+pub fn json_schema() -> String {
+    let schema = schemars::schema_for!(Report);
+    let mut text = serde_json::to_string_pretty(&schema).expect("a schema is plain JSON");
+    text.push('\n');
+    text
+}
