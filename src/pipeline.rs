@@ -1,1 +1,507 @@
-//! `compile()`: every stage, in order.
+//! `compile()`: every stage, in order. Read this file first.
+
+use std::time::Instant;
+
+use crate::certify::{self, Certificate, Goal, Task};
+use crate::command::{self, CommandTable, SampleOptions};
+use crate::diag::{Diagnostic, Diagnostics, Span, nearest};
+use crate::esdf;
+use crate::geom::{Pose2, wrap_angle};
+use crate::map::{self, MapInputs, VoxelMap};
+use crate::mission::{Mission, PathSpec, PoseSpec};
+use crate::optimize::{self, OptimizeOptions};
+use crate::report::schema::{InitialPart, ProfilePart, SearchPart, TrajectoryPart};
+use crate::report::{InputFile, InputsPart, Metrics, Report, metrics, path_error};
+use crate::retime::{self, MotionProfile, RetimeOptions};
+use crate::robot::{self, Files, RobotInputs, RobotModel, spec::RobotSpec};
+use crate::search::{self, Query, SearchError, SearchOptions, SearchPath};
+use crate::trajectory::{Leg, Trajectory, TrajectorySource, given};
+
+/// A text file that was read.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct TextFile {
+    /// Path as the user knows it.
+    pub name: String,
+    /// All of it.
+    pub text: String,
+}
+
+/// A map file that was read, and the one beside it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct MapFile {
+    /// Path as the user knows it.
+    pub name: String,
+    /// All of it.
+    pub bytes: Vec<u8>,
+    /// Path and bytes of map_server's image, or of `.npy`'s `.json`.
+    pub beside: Option<(String, Vec<u8>)>,
+}
+
+/// Everything a mission names, read. (`cli` reads; no stage opens a file but meshes through `files`.)
+pub struct Inputs {
+    /// Parsed.
+    pub mission: Mission,
+    /// Its text.
+    pub mission_text: TextFile,
+    /// robot.yaml, parsed; default where the mission names a bare URDF.
+    pub robot_spec: RobotSpec,
+    /// robot.yaml's text.
+    pub robot_yaml: Option<TextFile>,
+    /// The URDF.
+    pub urdf: TextFile,
+    /// The map.
+    pub map: Option<MapFile>,
+    /// `path: {file}`.
+    pub path_csv: Option<TextFile>,
+    /// Reader for meshes.
+    pub files: Box<dyn Files>,
+}
+
+/// What may differ from the mission.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct CompileOptions {
+    /// Instead of the mission's, s.
+    pub sampling_time: Option<f64>,
+}
+
+/// How a run of a mission ended.
+pub struct Outcome {
+    /// Always there; says `failed` and why where there are no commands.
+    pub report: Report,
+    /// What the commands are and rest on; `None`: failed.
+    pub compiled: Option<Compiled>,
+    /// Why it failed, in full.
+    pub diagnostics: Option<Diagnostics>,
+    /// Stage and milliseconds, in order.
+    pub timings: Vec<(&'static str, f64)>,
+}
+
+/// A certified motion.
+pub struct Compiled {
+    /// The robot, with the mission's limits.
+    pub robot: RobotModel,
+    /// The commands.
+    pub commands: CommandTable,
+    /// The proof.
+    pub certificate: Certificate,
+}
+
+/// What a mission's text and files mean, before anything is planned.
+pub struct World {
+    /// The robot, with the mission's limits.
+    pub robot: RobotModel,
+    /// Where the obstacles are.
+    pub map: Option<VoxelMap>,
+}
+
+/// Clearance beyond what must be certified that the search asks for first, m: what held commands may leave of a path.
+const SEARCH_MARGIN: f64 = 2e-3;
+/// Clearance beyond what must be certified that the optimiser aims at, m, one try after the other.
+const OPTIMISER_MARGINS: [f64; 3] = [0.01, 0.02, 0.04];
+
+/// Collects figures while the stages run.
+struct Run<'a> {
+    report: Report,
+    timings: Vec<(&'static str, f64)>,
+    progress: &'a mut dyn FnMut(&'static str),
+}
+
+impl Run<'_> {
+    /// Runs one stage and notes its time.
+    fn stage<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
+        (self.progress)(name);
+        let started = Instant::now();
+        let out = work();
+        let spent = started.elapsed().as_secs_f64() * 1e3;
+        match self.timings.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, sum)) => *sum += spent,
+            None => self.timings.push((name, spent)),
+        }
+        out
+    }
+}
+
+/// Compiles one mission. `progress` is told the name of each stage as it begins.
+pub fn compile(inputs: &mut Inputs, options: &CompileOptions, progress: &mut dyn FnMut(&'static str)) -> Outcome {
+    let report = Report::new(inputs_part(inputs));
+    let mut run = Run { report, timings: Vec::new(), progress };
+    let result = stages(inputs, options, &mut run);
+    let Run { mut report, timings, .. } = run;
+    match result {
+        Ok(compiled) => Outcome { report, compiled: Some(compiled), diagnostics: None, timings },
+        Err(diagnostics) => {
+            report.fail(&diagnostics);
+            Outcome { report, compiled: None, diagnostics: Some(diagnostics), timings }
+        }
+    }
+}
+
+fn stages(inputs: &mut Inputs, options: &CompileOptions, run: &mut Run<'_>) -> Result<Compiled, Diagnostics> {
+    let sampling_time = options.sampling_time.unwrap_or(inputs.mission.sampling_time);
+    let World { robot, map } = run.stage("read", || world(inputs))?;
+    run.report.robot = Some((&robot).into());
+    run.report.map = map.as_ref().map(Into::into);
+    let mission = &inputs.mission;
+    let finish = Finish { mission, robot: &robot, map: map.as_ref(), sampling_time };
+
+    let made = match &mission.path {
+        Some(path) => {
+            let trajectory = given_path(mission, path, inputs.path_csv.as_ref(), &robot)?;
+            finish.certify(run, trajectory)?
+        }
+        None => {
+            let map = map.as_ref().expect("the mission reader asks for a map where no path is given");
+            plan(run, &finish, map)?
+        }
+    };
+    let Made { profile, commands, certificate, trajectory } = made;
+    let own = match trajectory.source {
+        TrajectorySource::Optimised => metrics::of_trajectory(&trajectory, &robot),
+        _ => metrics::of_commands(&commands),
+    };
+    run.report.trajectory = Some(TrajectoryPart::new(&trajectory, Some(own)));
+    run.report.profile = Some(profile_part(&profile));
+    run.report.commands = Some((&commands).into());
+    run.report.judge(&certificate);
+    if !certificate.holds() {
+        return Err(refused(&certificate).into());
+    }
+    let rows = run.stage("path_error", || finish.path_errors(&profile, &trajectory));
+    run.report.path_error = rows?;
+    Ok(Compiled { robot, commands, certificate })
+}
+
+/// The robot and the map, checked against what the mission says of them.
+///
+/// # Errors
+/// All faults found.
+pub fn world(inputs: &mut Inputs) -> Result<World, Diagnostics> {
+    let mission = &inputs.mission;
+    let robot = robot::parse(RobotInputs {
+        spec: &inputs.robot_spec,
+        urdf: (&inputs.urdf.name, &inputs.urdf.text),
+        files: inputs.files.as_mut(),
+        overrides: &mission.limits,
+    })?;
+    let faults = unknown_joints(mission, &robot);
+    if !faults.is_empty() {
+        return Err(Diagnostics(faults));
+    }
+    let map = match (&mission.map, &inputs.map) {
+        (Some(spec), Some(file)) => {
+            let beside = file.beside.as_ref().map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
+            let inputs = MapInputs { name: &file.name, bytes: &file.bytes, beside };
+            Some(map::parse(&inputs, spec, robot.top_over_all_postures())?)
+        }
+        _ => None,
+    };
+    Ok(World { robot, map })
+}
+
+/// Joints that the mission names and the robot does not move, or cannot hold at that value.
+fn unknown_joints(mission: &Mission, robot: &RobotModel) -> Vec<Diagnostic> {
+    let names: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
+    let span = |under: &str, name: &str| -> Option<&Span> {
+        mission.spans.joints.iter().find(|j| j.under == under && j.name == name).map(|j| &j.at)
+    };
+    let mut faults = Vec::new();
+    for (under, pose) in [("start", &mission.start), ("goal", &mission.goal)] {
+        for (name, value) in pose.iter().flat_map(|p| &p.joints) {
+            let Some(joint) = robot.joints.iter().find(|j| j.name == *name) else {
+                let hint = match nearest(name, names.iter().copied()) {
+                    Some(known) => format!("did you mean `{known}`?"),
+                    None if names.is_empty() => "this robot has no moving joint".to_owned(),
+                    None => format!("moving joints: {}", names.join(", ")),
+                };
+                let message = format!("`{under}.joints` names `{name}`, which is no moving joint of `{}`", robot.name);
+                faults.push(Diagnostic::error("mission/unknown-joint", message).maybe_at(span(under, name)).hint(hint));
+                continue;
+            };
+            if *value < joint.lower - 1e-9 || *value > joint.upper + 1e-9 {
+                let message =
+                    format!("`{under}.joints.{name}` is {value}, outside its limits {} to {}", joint.lower, joint.upper);
+                faults.push(
+                    Diagnostic::error("mission/joint-out-of-limits", message)
+                        .maybe_at(span(under, name))
+                        .hint("angles are radians, or with `deg`"),
+                );
+            }
+        }
+    }
+    faults
+}
+
+/// A trajectory timed, sampled and judged.
+struct Made {
+    trajectory: Trajectory,
+    profile: MotionProfile,
+    commands: CommandTable,
+    certificate: Certificate,
+}
+
+/// Searches and optimises until something is certified; the search's own path is the last try.
+fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap) -> Result<Made, Diagnostics> {
+    let (mission, robot) = (finish.mission, finish.robot);
+    let field = run.stage("esdf", || esdf::build(map));
+    let query = query(mission, robot);
+    let found = run.stage("search", || {
+        let options = |margin: f64| SearchOptions { clearance: mission.clearance + margin, reverse: mission.reverse };
+        // What fits only without the margin is found too, and what is absent is absent without it.
+        search::search(map, &field, robot, &query, &options(SEARCH_MARGIN)).or_else(|error| match error {
+            SearchError::OffMap { .. } | SearchError::Limit { .. } => Err(error),
+            _ => search::search(map, &field, robot, &query, &options(0.0)),
+        })
+    });
+    let path = found.map_err(|error| place_search_error(mission, &error))?;
+    run.report.search = Some(SearchPart::from(&path));
+    run.report.initial = Some(InitialPart { metrics: metrics::of_search(&path, robot) });
+    if !path_moves(&path) {
+        return finish.certify(run, path.trajectory());
+    }
+    for margin in OPTIMISER_MARGINS {
+        let options = OptimizeOptions { clearance: mission.clearance + margin, ..Default::default() };
+        let trajectory = run.stage("optimize", || optimize::optimize(&path, &field, robot, &options));
+        // A trajectory that no law can time is one more reason to go on to the next try.
+        if let Ok(made) = finish.certify(run, trajectory) {
+            if made.certificate.holds() {
+                return Ok(made);
+            }
+        }
+    }
+    finish.certify(run, path.trajectory())
+}
+
+fn path_moves(path: &SearchPath) -> bool {
+    path.length() > 0.0
+}
+
+/// What comes after planning: time law, sampling, proof, path error.
+struct Finish<'a> {
+    mission: &'a Mission,
+    robot: &'a RobotModel,
+    map: Option<&'a VoxelMap>,
+    sampling_time: f64,
+}
+
+impl Finish<'_> {
+    /// The judged motion; its certificate may refuse.
+    fn certify(&self, run: &mut Run<'_>, trajectory: Trajectory) -> Result<Made, Diagnostics> {
+        // The search's path has no timing of its own.
+        let law = match (self.mission.time_law, trajectory.source) {
+            (crate::mission::TimeLaw::Minco, TrajectorySource::Search) => crate::mission::TimeLaw::Auto,
+            (law, _) => law,
+        };
+        let options = RetimeOptions { law, sampling_time: self.sampling_time };
+        let profile = run.stage("retime", || retime::retime(&trajectory, self.robot, &options))?;
+        let options = SampleOptions { sampling_time: self.sampling_time, sampling: self.mission.sampling };
+        let commands = run.stage("command", || command::sample(&profile, self.robot, &options))?;
+        let task = self.task(&trajectory);
+        let certificate = run.stage("certify", || certify::certify(&commands, self.robot, self.map, &task));
+        Ok(Made { trajectory, profile, commands, certificate })
+    }
+
+    fn task(&self, trajectory: &Trajectory) -> Task {
+        let (start, start_joints) = start_of(trajectory);
+        let planned = end_of(trajectory);
+        let goal = self.mission.goal.as_ref();
+        let goal_of = |f: fn(&PoseSpec) -> Option<f64>| goal.and_then(f);
+        let open_heading = self.mission.path.is_none() && goal_of(|g| g.yaw).is_none();
+        let joints = self.robot.joints.iter().map(|j| goal.and_then(|g| g.joints.get(&j.name).copied())).collect();
+        let goal = Goal {
+            x: goal_of(|g| g.x).unwrap_or(planned.x),
+            y: goal_of(|g| g.y).unwrap_or(planned.y),
+            yaw: (!open_heading).then(|| goal_of(|g| g.yaw).unwrap_or(planned.yaw)),
+            joints,
+        };
+        Task { start, start_joints, goal, clearance: self.mission.clearance }
+    }
+
+    fn path_errors(
+        &self,
+        profile: &MotionProfile,
+        trajectory: &Trajectory,
+    ) -> Result<Vec<crate::report::PathErrorRow>, Diagnostics> {
+        let task = self.task(trajectory);
+        let clearance = |table: &CommandTable| certify::certify(table, self.robot, self.map, &task).clearance_proven;
+        let times = &self.mission.path_error_times;
+        let rows = path_error::path_errors(profile, self.robot, times, self.mission.sampling, clearance)?;
+        Ok(rows.iter().map(Into::into).collect())
+    }
+}
+
+/// Where a trajectory starts: pose and joint values.
+fn start_of(trajectory: &Trajectory) -> (Pose2, Vec<f64>) {
+    match &trajectory.legs[0] {
+        Leg::Still(still) => (still.pose, still.joints_from.clone()),
+        Leg::Drive(drive) => {
+            let value = |d| drive.curve.derivative(d, 0, 0.0);
+            let dims = drive.curve.pieces[0].coefficients.len();
+            (Pose2::new(value(0), value(1), drive.yaw_start), (2..dims).map(value).collect())
+        }
+    }
+}
+
+/// Where a trajectory ends.
+fn end_of(trajectory: &Trajectory) -> Pose2 {
+    match &trajectory.legs[trajectory.legs.len() - 1] {
+        Leg::Still(still) => Pose2 { yaw: still.yaw_end, ..still.pose },
+        Leg::Drive(drive) => {
+            let end = drive.curve.duration();
+            let [x, y, dx, dy] = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(d, order)| drive.curve.derivative(d, order, end));
+            let yaw = dy.atan2(dx) + if drive.reverse { std::f64::consts::PI } else { 0.0 };
+            Pose2::new(x, y, wrap_angle(yaw))
+        }
+    }
+}
+
+/// What the search is asked.
+fn query(mission: &Mission, robot: &RobotModel) -> Query {
+    let [start, goal] = [&mission.start, &mission.goal].map(|p| p.clone().unwrap_or_default());
+    let pose = |p: &PoseSpec| Pose2::new(p.x.unwrap_or(0.0), p.y.unwrap_or(0.0), p.yaw.unwrap_or(0.0));
+    let joints = |p: &PoseSpec| robot.joints.iter().map(|j| p.joints.get(&j.name).copied()).collect();
+    Query {
+        start: pose(&start),
+        start_joints: joints(&start),
+        goal: pose(&goal),
+        goal_yaw: goal.yaw,
+        goal_joints: joints(&goal),
+    }
+}
+
+/// Points a search error at the pose it is about.
+fn place_search_error(mission: &Mission, error: &SearchError) -> Diagnostics {
+    use crate::diag::Describe;
+    let span = match error {
+        SearchError::StartBlocked { .. } | SearchError::OffMap { which: "start", .. } => mission.spans.start.as_ref(),
+        _ => mission.spans.goal.as_ref(),
+    };
+    error.diagnostic().maybe_at(span).into()
+}
+
+/// The mission's own path as a trajectory.
+fn given_path(
+    mission: &Mission,
+    path: &PathSpec,
+    csv: Option<&TextFile>,
+    robot: &RobotModel,
+) -> Result<Trajectory, Diagnostics> {
+    let start = mission.start.clone().unwrap_or_default();
+    let held: Vec<f64> =
+        robot.joints.iter().map(|j| start.joints.get(&j.name).copied().unwrap_or(0f64.clamp(j.lower, j.upper))).collect();
+    let trajectory = match (path, csv) {
+        (PathSpec::Bezier(segments), _) => given::from_bezier(segments, &held)?,
+        (PathSpec::File(_), Some(csv)) => given::from_csv(&csv.name, &csv.text, robot, &held)?,
+        (PathSpec::File(file), None) => {
+            let message = format!("path file `{}` was not read", file.display());
+            return Err(Diagnostic::error("mission/path-not-read", message).into());
+        }
+    };
+    let (first, _) = start_of(&trajectory);
+    let last = end_of(&trajectory);
+    let ends = [("start", &mission.start, first, &mission.spans.start), ("goal", &mission.goal, last, &mission.spans.goal)];
+    for (which, spec, own, span) in ends {
+        let Some(spec) = spec else { continue };
+        let off = |a: Option<f64>, b: f64| a.is_some_and(|a| (a - b).abs() > 1e-6);
+        if off(spec.x, own.x) || off(spec.y, own.y) || spec.yaw.is_some_and(|yaw| wrap_angle(yaw - own.yaw).abs() > 1e-6) {
+            let message = format!(
+                "`{which}` contradicts the given path, which has x {:.6}, y {:.6}, heading {:.6} rad there",
+                own.x, own.y, own.yaw
+            );
+            let fault = Diagnostic::error("mission/path-end", message).maybe_at(span.as_ref());
+            return Err(fault.hint(format!("leave `{which}` out, or keep only its joints")).into());
+        }
+    }
+    Ok(trajectory)
+}
+
+fn refused(certificate: &Certificate) -> Diagnostic {
+    let reasons: Vec<&str> = certificate.refusals.iter().map(|r| r.message.as_str()).collect();
+    Diagnostic::failure("certify/refused", format!("the certificate is refused: {}", reasons.join("; ")))
+        .hint("lower `clearance_m` or the speed limits, or shorten `sampling_time_s`")
+}
+
+fn profile_part(profile: &MotionProfile) -> ProfilePart {
+    ProfilePart {
+        time_law: profile.law_name(),
+        time_s: profile.time(),
+        v_max_mps: Some(profile.v_max()),
+        v_comp_mps: Some(profile.v_comp()),
+    }
+}
+
+fn inputs_part(inputs: &Inputs) -> InputsPart {
+    let mission = &inputs.mission;
+    let file = |path: &str, bytes: &[u8]| InputFile::new(path, bytes);
+    let robot = inputs.robot_yaml.as_ref().unwrap_or(&inputs.urdf);
+    let mut other = Vec::new();
+    if inputs.robot_yaml.is_some() {
+        other.push(file(&inputs.urdf.name, inputs.urdf.text.as_bytes()));
+    }
+    other.extend(inputs.path_csv.iter().map(|f| file(&f.name, f.text.as_bytes())));
+    let map = inputs.map.as_ref();
+    other.extend(map.and_then(|m| m.beside.as_ref()).map(|(name, bytes)| file(name, bytes)));
+    InputsPart {
+        mission: file(&inputs.mission_text.name, inputs.mission_text.text.as_bytes()),
+        robot: Some(file(&mission.robot.display().to_string(), robot.text.as_bytes())),
+        map: mission.map.as_ref().zip(map).map(|(spec, m)| file(&spec.file.display().to_string(), &m.bytes)),
+        other,
+    }
+}
+
+/// Judges commands that this program did not plan, against a mission's robot, map, limits, start and goal.
+///
+/// # Errors
+/// Bad inputs; joints of the table that are not the robot's.
+pub fn check(inputs: &mut Inputs, table: &CommandTable) -> Result<Certificate, Diagnostics> {
+    let World { robot, map } = world(inputs)?;
+    let mission = &inputs.mission;
+    let expected: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
+    let found: Vec<&str> = table.joints.iter().map(|(name, _)| name.as_str()).collect();
+    if expected != found {
+        let message = format!("the commands move joints [{}], the robot has [{}]", found.join(", "), expected.join(", "));
+        return Err(Diagnostic::error("check/joints", message).into());
+    }
+    let Some(first) = table.rows.first() else {
+        return Err(Diagnostic::error("check/empty", "the command file has no row").into());
+    };
+    let (start, goal) = match &mission.path {
+        Some(path) => {
+            let trajectory = given_path(mission, path, inputs.path_csv.as_ref(), &robot)?;
+            (Some(start_of(&trajectory)), Some(end_of(&trajectory)))
+        }
+        None => (None, None),
+    };
+    let asked = |pose: &Option<PoseSpec>, f: fn(&PoseSpec) -> Option<f64>| pose.as_ref().and_then(f);
+    let start_pose = match &start {
+        Some((pose, _)) => *pose,
+        None => Pose2::new(
+            asked(&mission.start, |p| p.x).unwrap_or(first.pose.x),
+            asked(&mission.start, |p| p.y).unwrap_or(first.pose.y),
+            asked(&mission.start, |p| p.yaw).unwrap_or(first.pose.yaw),
+        ),
+    };
+    let joint = |pose: &Option<PoseSpec>, name: &str| pose.as_ref().and_then(|p| p.joints.get(name).copied());
+    let start_joints = robot
+        .joints
+        .iter()
+        .zip(&first.joint_positions)
+        .map(|(j, own)| joint(&mission.start, &j.name).unwrap_or(*own))
+        .collect();
+    let task = Task {
+        start: start_pose,
+        start_joints,
+        goal: Goal {
+            x: asked(&mission.goal, |p| p.x).or(goal.map(|g| g.x)).unwrap_or(first.pose.x),
+            y: asked(&mission.goal, |p| p.y).or(goal.map(|g| g.y)).unwrap_or(first.pose.y),
+            yaw: asked(&mission.goal, |p| p.yaw).or(goal.map(|g| g.yaw)),
+            joints: robot.joints.iter().map(|j| joint(&mission.goal, &j.name)).collect(),
+        },
+        clearance: mission.clearance,
+    };
+    Ok(certify::certify(table, &robot, map.as_ref(), &task))
+}
+
+/// Length and time of the mission's held commands; for tools.
+pub fn driven(commands: &CommandTable) -> Metrics {
+    metrics::of_commands(commands)
+}
