@@ -37,7 +37,7 @@ pub(super) struct Drive {
 /// The driving wheels, named in robot.yaml or found.
 pub(super) fn wheels(spec: &RobotSpec, urdf: &Urdf, tree: &Tree) -> Result<Wheels, Diagnostics> {
     match (&spec.drive_left[..], &spec.drive_right[..]) {
-        ([], []) => Ok(find(urdf, tree)?),
+        ([], []) => find(urdf, tree),
         ([], [one, ..]) | ([one, ..], []) => {
             let (given, missing) = if spec.drive_left.is_empty() { ("right", "left") } else { ("left", "right") };
             let message = format!("drive.{given} is named, drive.{missing} is not");
@@ -73,7 +73,7 @@ pub(super) fn wheels(spec: &RobotSpec, urdf: &Urdf, tree: &Tree) -> Result<Wheel
 }
 
 /// The only two coaxial continuous joints with a horizontal axis that hang on no other continuous joint.
-fn find(urdf: &Urdf, tree: &Tree) -> Result<Wheels, Diagnostic> {
+fn find(urdf: &Urdf, tree: &Tree) -> Result<Wheels, Diagnostics> {
     let joints = &urdf.robot.joints;
     let turns = |j: usize| joints[j].joint_type == JointType::Continuous;
     // Links beyond a continuous joint, which is how castors hang.
@@ -86,16 +86,17 @@ fn find(urdf: &Urdf, tree: &Tree) -> Result<Wheels, Diagnostic> {
     let poses = tree.link_poses(urdf, |_| 0.0);
     let axes: Vec<Axle> = candidates.iter().map(|j| Axle::of(urdf, tree, &poses, *j)).collect();
 
-    let mut pairs = Vec::new();
+    let (mut pairs, mut first) = (0, None);
     for (l, left) in axes.iter().enumerate() {
         for (r, right) in axes.iter().enumerate() {
             let apart = left.origin - right.origin;
             if apart.y > 1e-6 && left.horizontal() && left.parallel(&right.axis) && left.parallel(&apart) {
-                pairs.push((candidates[l], candidates[r]));
+                pairs += 1;
+                first.get_or_insert((candidates[l], candidates[r]));
             }
         }
     }
-    if let [(left, right)] = pairs[..] {
+    if let (1, Some((left, right))) = (pairs, first) {
         return Ok(Wheels { left: vec![left], right: vec![right] });
     }
     let list: Vec<String> = candidates
@@ -108,11 +109,10 @@ fn find(urdf: &Urdf, tree: &Tree) -> Result<Wheels, Diagnostic> {
         .collect();
     let list = if list.is_empty() { "none".into() } else { list.join("; ") };
     let message = format!(
-        "drive wheels not found: {} coaxial pairs, not one; continuous joints that could be wheels: {list}",
-        pairs.len()
+        "drive wheels not found: {pairs} coaxial pairs, not one; continuous joints that could be wheels: {list}"
     );
     let fault = Diagnostic::error("robot/wheels-not-found", message).at(&urdf.whole());
-    Err(fault.hint("name drive.left and drive.right in robot.yaml"))
+    Err(fault.hint("name drive.left and drive.right in robot.yaml").into())
 }
 
 /// A wheel joint's axis and origin, in the root frame.

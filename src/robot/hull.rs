@@ -1,6 +1,6 @@
 //! Extreme points of a point cloud: quickhull in three dimensions.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
 
@@ -13,7 +13,7 @@ const CONTAINMENT: f64 = 1e-9;
 
 /// The points that span the convex hull of `points`, sorted by x, y, z, none twice.
 ///
-/// Every point given lies in the hull of those returned, to within [`CONTAINMENT`]: that is checked at the end, and where it does not
+/// Every point given lies in the hull of those returned, to within 1e-9 of the cloud's size: that is checked at the end, and where it does not
 /// hold, or the cloud is flat or smaller than a tetrahedron, all (distinct) points are returned.
 pub fn extreme_points(points: &[[f64; 3]]) -> Vec<[f64; 3]> {
     let mut distinct: Vec<[f64; 3]> = points.iter().map(|p| p.map(|v| v + 0.0)).collect(); // + 0.0: no negative zeros
@@ -61,22 +61,39 @@ impl Face {
 struct Quickhull<'a> {
     cloud: &'a [Vector3<f64>],
     tolerance: f64,
-    faces: Vec<Face>,
+    /// `None`: replaced by later ones.
+    faces: Vec<Option<Face>>,
+    /// The face on whose rim a directed edge runs; its neighbour has the edge the other way round.
+    edges: BTreeMap<(usize, usize), usize>,
 }
 
 impl<'a> Quickhull<'a> {
     /// The faces of the hull; `None` where the cloud has no volume or rounding broke the surface.
     fn run(cloud: &'a [Vector3<f64>], flatness: f64) -> Option<Vec<Face>> {
-        let mut hull = Self { cloud, tolerance: 0.0, faces: Vec::new() };
+        let mut hull = Self { cloud, tolerance: 0.0, faces: Vec::new(), edges: BTreeMap::new() };
         let size = hull.start(flatness)?;
-        // Each point becomes a corner at most once, so the loop ends.
-        while let Some(face) = hull.faces.iter().position(|f| !f.outside.is_empty()) {
-            hull.add_farthest(face)?;
+        // Oldest faces first: that takes in the far points before those near an edge. Each point becomes a corner at most once, so
+        // the loop ends.
+        let mut next = 0;
+        while next < hull.faces.len() {
+            if hull.faces[next].as_ref().is_some_and(|f| !f.outside.is_empty()) {
+                hull.add_farthest(next)?;
+            }
+            next += 1;
         }
-        let edges: BTreeSet<_> = hull.faces.iter().flat_map(Face::edges).collect();
-        let closed = edges.len() == 3 * hull.faces.len() && edges.iter().all(|(a, b)| edges.contains(&(*b, *a)));
+        let closed = hull.edges.keys().all(|(a, b)| hull.edges.contains_key(&(*b, *a)));
+        let faces: Vec<Face> = hull.faces.into_iter().flatten().collect();
         let holds = |f: &Face| cloud.iter().all(|p| f.height(p) <= CONTAINMENT * size);
-        (closed && hull.faces.iter().all(holds)).then_some(hull.faces)
+        (closed && hull.edges.len() == 3 * faces.len() && faces.iter().all(holds)).then_some(faces)
+    }
+
+    /// Adds a face; `None` where one of its edges is taken already, which rounding alone can bring about.
+    fn add(&mut self, corners: [usize; 3]) -> Option<()> {
+        let face = Face::new(self.cloud, corners)?;
+        let index = self.faces.len();
+        let free = face.edges().into_iter().all(|edge| self.edges.insert(edge, index).is_none());
+        self.faces.push(Some(face));
+        free.then_some(())
     }
 
     /// The first tetrahedron; returns the cloud's size.
@@ -102,7 +119,7 @@ impl<'a> Quickhull<'a> {
         self.tolerance = flatness * size;
         let [a, b, c] = if face.height(&cloud[d]) > 0.0 { [a, c, b] } else { [a, b, c] };
         for corners in [[a, b, c], [a, d, b], [b, d, c], [c, d, a]] {
-            self.faces.push(Face::new(cloud, corners)?);
+            self.add(corners)?;
         }
         self.assign(0, (0..cloud.len()).collect());
         Some(size)
@@ -111,9 +128,8 @@ impl<'a> Quickhull<'a> {
     /// Gives each point to the first face from index `from` on that it is in front of; the others are inside.
     fn assign(&mut self, from: usize, points: Vec<usize>) {
         for p in points {
-            let tolerance = self.tolerance;
-            let face = self.faces[from..].iter_mut().find(|f| f.height(&self.cloud[p]) > tolerance);
-            if let Some(face) = face {
+            let mut faces = self.faces[from..].iter_mut().flatten();
+            if let Some(face) = faces.find(|f| f.height(&self.cloud[p]) > self.tolerance) {
                 face.outside.push(p);
             }
         }
@@ -121,19 +137,39 @@ impl<'a> Quickhull<'a> {
 
     /// Takes the point farthest in front of a face into the hull: the faces that it sees give way to a cone from their rim.
     fn add_farthest(&mut self, face: usize) -> Option<()> {
-        let seen_by = &self.faces[face];
+        let seen_by = self.faces[face].as_ref()?;
         let farthest = seen_by.outside.iter().map(|p| (seen_by.height(&self.cloud[*p]), *p));
         let (_, apex) = farthest.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))?;
-        let (seen, kept) = std::mem::take(&mut self.faces)
-            .into_iter()
-            .partition(|f: &Face| f.height(&self.cloud[apex]) > self.tolerance);
-        self.faces = kept;
-        let edges: BTreeSet<_> = seen.iter().flat_map(Face::edges).collect();
-        let from = self.faces.len();
-        for (a, b) in edges.iter().filter(|(a, b)| !edges.contains(&(*b, *a))) {
-            self.faces.push(Face::new(self.cloud, [*a, *b, apex])?);
+        let (mut seen, mut rim) = (vec![face], Vec::new());
+        let mut known = BTreeSet::from([face]);
+        let mut next = 0;
+        while next < seen.len() {
+            for (a, b) in self.faces[seen[next]].as_ref()?.edges() {
+                let neighbour = *self.edges.get(&(b, a))?;
+                if known.contains(&neighbour) {
+                    continue;
+                }
+                if self.faces[neighbour].as_ref()?.height(&self.cloud[apex]) > self.tolerance {
+                    known.insert(neighbour);
+                    seen.push(neighbour);
+                } else {
+                    rim.push((a, b));
+                }
+            }
+            next += 1;
         }
-        self.assign(from, seen.into_iter().flat_map(|f: Face| f.outside).filter(|p| *p != apex).collect());
+        let mut orphans = Vec::new();
+        for face in seen.into_iter().filter_map(|index| self.faces[index].take()) {
+            for edge in face.edges() {
+                self.edges.remove(&edge);
+            }
+            orphans.extend(face.outside.into_iter().filter(|p| *p != apex));
+        }
+        let from = self.faces.len();
+        for (a, b) in rim {
+            self.add([a, b, apex])?;
+        }
+        self.assign(from, orphans);
         Some(())
     }
 }

@@ -1,10 +1,11 @@
 //! What each joint of the URDF does: moved by the planner, held, or following another by `<mimic>`.
 
+use std::collections::BTreeMap;
+
 use urdf_rs::JointType;
 
 use super::drive::Wheels;
 use super::spec::{RobotSpec, Written};
-use super::tree::Tree;
 use super::urdf::Urdf;
 use crate::diag::{Diagnostic, Diagnostics, nearest};
 
@@ -75,7 +76,7 @@ pub(super) fn range(urdf: &Urdf, joint: usize) -> [f64; 2] {
 /// # Errors
 /// Names that do not exist; moving or fixed joints that are wheels, mimics, rigid or named twice; held values beyond the joint's
 /// limits; mimics of each other.
-pub(super) fn roles(spec: &RobotSpec, urdf: &Urdf, tree: &Tree, wheels: &Wheels) -> Result<Roles, Diagnostics> {
+pub(super) fn roles(spec: &RobotSpec, urdf: &Urdf, wheels: &Wheels) -> Result<Roles, Diagnostics> {
     let mut faults = Vec::new();
     let joints = &urdf.robot.joints;
     let is_wheel = |j: usize| wheels.all().any(|w| w == j);
@@ -130,46 +131,64 @@ pub(super) fn roles(spec: &RobotSpec, urdf: &Urdf, tree: &Tree, wheels: &Wheels)
             (0..joints.len()).filter(|j| free(*j) && held[*j].is_none() && velocity(&joints[*j]).is_some()).collect();
     }
 
+    let index: BTreeMap<&str, usize> = joints.iter().enumerate().map(|(j, joint)| (joint.name.as_str(), j)).collect();
+    let followed = |j: usize| {
+        joints[j].mimic.as_ref().filter(|_| !is_wheel(j)).map(|mimic| Followed {
+            joint: *index.get(mimic.joint.as_str()).expect("urdf::read checked all names of joints"),
+            multiplier: mimic.multiplier.unwrap_or(1.0),
+            offset: mimic.offset.unwrap_or(0.0),
+        })
+    };
+    let sources: Vec<Option<Followed>> = (0..joints.len()).map(followed).collect();
     let mut values = Vec::with_capacity(joints.len());
-    for j in 0..joints.len() {
-        match resolve(urdf, j, &is_wheel) {
-            Ok((source, multiplier, offset)) => values.push(match moving.iter().position(|m| *m == source) {
-                Some(joint) if multiplier != 0.0 && joints[j].joint_type != JointType::Fixed => {
-                    Value::Driven { joint, multiplier, offset }
-                }
-                Some(_) => Value::Held(offset),
-                None => {
-                    let [lower, upper] = range(urdf, source);
-                    let rest = if is_wheel(source) { 0.0 } else { 0f64.max(lower).min(upper) };
-                    Value::Held(multiplier * held[source].unwrap_or(rest) + offset)
-                }
-            }),
-            Err(fault) => faults.push(*fault),
-        }
+    for (j, joint) in joints.iter().enumerate() {
+        let (source, multiplier, offset) = match resolve(urdf, &sources, j) {
+            Ok(resolved) => resolved,
+            Err(fault) => {
+                faults.push(*fault);
+                continue;
+            }
+        };
+        values.push(match moving.iter().position(|m| *m == source) {
+            Some(index) if multiplier != 0.0 && joint.joint_type != JointType::Fixed => {
+                Value::Driven { joint: index, multiplier, offset }
+            }
+            Some(_) => Value::Held(offset),
+            None => {
+                let [lower, upper] = range(urdf, source);
+                let rest = if is_wheel(source) { 0.0 } else { 0f64.max(lower).min(upper) };
+                Value::Held(multiplier * held[source].unwrap_or(rest) + offset)
+            }
+        });
     }
-    debug_assert_eq!(tree.child.len(), joints.len());
     if faults.is_empty() { Ok(Roles { moving, values }) } else { Err(Diagnostics(faults)) }
 }
 
+/// A `<mimic>`: this much of another joint.
+struct Followed {
+    joint: usize,
+    multiplier: f64,
+    offset: f64,
+}
+
 /// Follows mimics to their source: (source, multiplier, offset).
-fn resolve(urdf: &Urdf, joint: usize, is_wheel: &impl Fn(usize) -> bool) -> Result<(usize, f64, f64), Box<Diagnostic>> {
-    let joints = &urdf.robot.joints;
+fn resolve(urdf: &Urdf, sources: &[Option<Followed>], joint: usize) -> Result<(usize, f64, f64), Box<Diagnostic>> {
     let (mut source, mut multiplier, mut offset) = (joint, 1.0, 0.0);
+    let name = &urdf.robot.joints[joint].name;
     let mut steps = 0;
-    while let Some(mimic) = joints[source].mimic.as_ref().filter(|_| !is_wheel(source)) {
-        offset += multiplier * mimic.offset.unwrap_or(0.0);
-        multiplier *= mimic.multiplier.unwrap_or(1.0);
-        source = joints.iter().position(|j| j.name == mimic.joint).expect("urdf::read checked all names of joints");
+    while let Some(followed) = &sources[source] {
+        offset += multiplier * followed.offset;
+        multiplier *= followed.multiplier;
+        source = followed.joint;
         steps += 1;
-        if steps > joints.len() || !(multiplier.is_finite() && offset.is_finite()) {
-            let name = &joints[joint].name;
-            let (code, message) = if source == joint || steps > joints.len() {
-                ("robot/mimic-cycle", format!("joint `{name}` follows joints that mimic each other in a circle"))
-            } else {
-                ("robot/mimic-cycle", format!("the factors of the joints that `{name}` mimics overflow"))
-            };
-            return Err(Box::new(Diagnostic::error(code, message).at(&urdf.joint_spans[joint])));
-        }
+        let message = if steps > sources.len() {
+            format!("joint `{name}` follows joints that mimic each other in a circle")
+        } else if !(multiplier.is_finite() && offset.is_finite()) {
+            format!("the factors of the joints that `{name}` mimics overflow")
+        } else {
+            continue;
+        };
+        return Err(Box::new(Diagnostic::error("robot/mimic-cycle", message).at(&urdf.joint_spans[joint])));
     }
     Ok((source, multiplier, offset))
 }

@@ -1,6 +1,7 @@
 //! Stage 2: the robot. URDF and robot.yaml text in, [`RobotModel`] out.
 
 mod bodies;
+mod bound;
 pub mod convex;
 mod describe;
 mod drive;
@@ -108,9 +109,9 @@ pub struct BaseLimits {
     pub angular_speed: f64,
     /// rad/s^2.
     pub angular_acceleration: f64,
-    /// [SCR] Eq. 14: turning speed falls with driving speed, `omega <= 2 eta (v_max - v) / D`.
+    /// \[SCR\] Eq. 14: turning speed falls with driving speed, `omega <= 2 eta (v_max - v) / D`.
     pub eta: f64,
-    /// m/s; [SCR] section V-C.
+    /// m/s; \[SCR\] section V-C.
     pub min_speed: f64,
 }
 
@@ -206,7 +207,7 @@ pub fn parse(inputs: RobotInputs<'_>) -> Result<RobotModel, Diagnostics> {
     let urdf = urdf::read(name, text)?;
     let tree = tree::Tree::new(&urdf)?;
     let wheels = drive::wheels(spec, &urdf, &tree)?;
-    let roles = joints::roles(spec, &urdf, &tree, &wheels)?;
+    let roles = joints::roles(spec, &urdf, &wheels)?;
     let drive = drive::drive(spec, &urdf, &tree, &wheels, |joint| roles.at_zero(joint))?;
 
     let mut overrides = limits::Overrides { spec, mission: overrides, faults: Vec::new() };

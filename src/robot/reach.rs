@@ -4,19 +4,14 @@
 //! changes it faster than the distance of the farthest point from that joint's axis. Those distances are bounded the same way, from
 //! the tip of the chain to its base, so every step rests on a proven one.
 
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
 use std::f64::consts::PI;
 
 use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3};
 
+use super::bound::upper_bound;
 use super::{Convex, RobotModel};
 use crate::geom::Aabb;
 
-/// How far a bound over all postures may lie above the true figure, m, where few joints move a shape.
-const TOLERANCE: f64 = 5e-4;
-/// Postures that a bound may look at.
-const BUDGET: usize = 1500;
 /// Added to every bound for rounding, m.
 const ROUNDING: f64 = 1e-9;
 /// Sides of the polygon that stands in for a cylinder's circle (circumscribed: 0.12 % too large).
@@ -61,8 +56,8 @@ impl Outer {
         Self { points, radius }
     }
 
-    /// Largest distance from the z axis of `frame`, the shape being at `pose` in it.
-    fn from_z_axis(&self, pose: &Isometry3<f64>) -> f64 {
+    /// Largest distance from the z axis of a frame, the shape being at `pose` in it.
+    fn distance_from_z(&self, pose: &Isometry3<f64>) -> f64 {
         let turn = pose.rotation.to_rotation_matrix();
         let flat = |p: &Vector3<f64>| {
             let p = turn * p + pose.translation.vector;
@@ -70,70 +65,6 @@ impl Outer {
         };
         self.points.iter().map(flat).fold(0.0, f64::max).sqrt() + self.radius
     }
-}
-
-/// A box of joint values and the greatest value possible in it.
-struct Node {
-    bound: f64,
-    centre: Vec<f64>,
-    half: Vec<f64>,
-}
-
-impl PartialEq for Node {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Node {}
-
-impl PartialOrd for Node {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Node {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.bound.total_cmp(&other.bound)
-    }
-}
-
-/// An upper bound of `value` over the box `ranges`; `slopes`: largest rate of change by each coordinate. Stops looking once the bound
-/// is at most `enough`.
-fn upper_bound(ranges: &[[f64; 2]], slopes: &[f64], enough: f64, mut value: impl FnMut(&[f64]) -> f64) -> f64 {
-    let free = |i: usize| slopes[i] > 0.0 && ranges[i][1] > ranges[i][0];
-    if (0..ranges.len()).any(|i| free(i) && !(ranges[i][1] - ranges[i][0]).is_finite()) {
-        return f64::INFINITY;
-    }
-    let slack = |half: &[f64]| slopes.iter().zip(half).map(|(s, h)| if *h > 0.0 { s * h } else { 0.0 }).sum::<f64>();
-    let rest = |[low, high]: &[f64; 2]| if low.is_finite() && high.is_finite() { 0.5 * (low + high) } else { 0.0 };
-    let centre: Vec<f64> = ranges.iter().map(rest).collect();
-    let half: Vec<f64> =
-        (0..ranges.len()).map(|i| if free(i) { 0.5 * (ranges[i][1] - ranges[i][0]) } else { 0.0 }).collect();
-    let mut best = value(&centre);
-    let mut heap = BinaryHeap::from([Node { bound: best + slack(&half), centre, half }]);
-    let mut looked = 1;
-    while let Some(node) = heap.pop() {
-        if node.bound <= (best + TOLERANCE).max(enough) || looked >= BUDGET {
-            return node.bound;
-        }
-        let weight = |i: usize| slopes[i] * node.half[i];
-        let widest = (0..slopes.len()).max_by(|a, b| weight(*a).total_cmp(&weight(*b)).then(b.cmp(a)));
-        let Some(widest) = widest.filter(|i| weight(*i) > 0.0) else {
-            return node.bound;
-        };
-        for sign in [-1.0, 1.0] {
-            let (mut centre, mut half) = (node.centre.clone(), node.half.clone());
-            half[widest] *= 0.5;
-            centre[widest] += sign * half[widest];
-            let here = value(&centre);
-            looked += 1;
-            best = best.max(here);
-            heap.push(Node { bound: (here + slack(&half)).min(node.bound), centre, half });
-        }
-    }
-    best
 }
 
 /// The bodies between the base and a shape, and what is proven about them.
@@ -203,7 +134,7 @@ impl<'a> Chain<'a> {
                 let upright = UnitQuaternion::rotation_between(&motion.axis, &Vector3::z()).unwrap_or_else(|| {
                     UnitQuaternion::from_rotation_matrix(&Rotation3::from_axis_angle(&Vector3::x_axis(), PI))
                 });
-                let distance = |q: &[f64]| self.outer.from_z_axis(&(upright * self.pose(i + 1, q)));
+                let distance = |q: &[f64]| self.outer.distance_from_z(&(upright * self.pose(i + 1, q)));
                 let bound = upper_bound(&self.ranges, &self.slopes(i + 1), f64::NEG_INFINITY, distance);
                 factor * (bound.min(ball) + ROUNDING)
             };
@@ -211,8 +142,9 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// Slopes of the height alone: a slide or hinge whose tilt never changes lifts less than it moves.
-    fn height_slopes(&self) -> Vec<f64> {
+    /// Slopes of the height (or of the horizontal distance) in the base frame: where a joint's tilt never changes, a slide lifts (or
+    /// shifts) by its axis' share only, and a hinge lifts by its axis' horizontal share.
+    fn base_slopes(&self, height: bool) -> Vec<f64> {
         let mut slopes = vec![0.0; self.robot.joints.len()];
         let mut pose = self.robot.bodies[0].origin;
         let mut tilt_known = true;
@@ -222,9 +154,15 @@ impl<'a> Chain<'a> {
             pose *= body.pose_in_parent(&q);
             let Some(motion) = &body.motion else { continue };
             let axis = pose.rotation * motion.axis.into_inner();
-            let lift = if motion.prismatic { axis.z.abs() } else { axis.x.hypot(axis.y) };
-            slopes[motion.joint] += if tilt_known { arm * (lift + ROUNDING).min(1.0) } else { *arm };
-            tilt_known &= motion.prismatic || lift < ROUNDING;
+            let (flat, upright) = (axis.x.hypot(axis.y), axis.z.abs());
+            let share = match (motion.prismatic, height) {
+                _ if !tilt_known => 1.0,
+                (true, true) => upright,
+                (false, false) => 1.0,
+                _ => flat,
+            };
+            slopes[motion.joint] += arm * (share + ROUNDING).min(1.0);
+            tilt_known &= motion.prismatic || flat < ROUNDING;
         }
         slopes
     }
@@ -244,7 +182,7 @@ fn along(convex: &Convex, pose: &Isometry3<f64>, direction: &Vector3<f64>) -> f6
 /// Greatest horizontal distance of a shape at a pose from the z axis.
 fn horizontal(convex: &Convex, pose: &Isometry3<f64>) -> f64 {
     let Convex::Cylinder { .. } = convex else {
-        return Outer::of(convex).from_z_axis(pose);
+        return Outer::of(convex).distance_from_z(pose);
     };
     // Distance is convex, so stepping to the farthest point in the present direction only ever gains; start from the best of many.
     let step = |direction: Vector3<f64>| {
@@ -300,7 +238,8 @@ impl RobotModel {
         for shape in 0..self.shapes.len() {
             let chain = Chain::new(self, shape);
             let convex = &self.shapes[shape].convex;
-            let bound = upper_bound(&chain.ranges, &chain.height_slopes(), highest, |q| top(convex, &chain.pose(0, q)));
+            let bound =
+                upper_bound(&chain.ranges, &chain.base_slopes(true), highest, |q| top(convex, &chain.pose(0, q)));
             let bound = if bound.is_finite() { bound } else { self.ball(&chain) };
             highest = highest.max(bound + ROUNDING);
         }
@@ -311,8 +250,9 @@ impl RobotModel {
     pub fn reach(&self, shape: usize) -> ShapeReach {
         let chain = Chain::new(self, shape);
         let joints = chain.slopes(0);
-        let bound =
-            upper_bound(&chain.ranges, &joints, f64::NEG_INFINITY, |q| chain.outer.from_z_axis(&chain.pose(0, q)));
+        let bound = upper_bound(&chain.ranges, &chain.base_slopes(false), f64::NEG_INFINITY, |q| {
+            chain.outer.distance_from_z(&chain.pose(0, q))
+        });
         let radius = if bound.is_finite() { bound } else { self.ball(&chain) };
         ShapeReach { radius: radius + ROUNDING, joints }
     }

@@ -120,7 +120,7 @@ fn character(source: &Arc<Source>, at: usize) -> Span {
     Span::new(source, at..at + length)
 }
 
-fn check_depth(source: &Arc<Source>, document: &Document) -> Result<(), Diagnostic> {
+fn check_depth(source: &Arc<Source>, document: &Document) -> Result<(), Diagnostics> {
     // Parents come before their children, so one pass is enough, however deep the text is.
     let mut depths: Vec<usize> = Vec::new();
     for node in document.descendants() {
@@ -128,7 +128,7 @@ fn check_depth(source: &Arc<Source>, document: &Document) -> Result<(), Diagnost
         if depth > MAX_DEPTH {
             let message = format!("elements are nested more than {MAX_DEPTH} deep");
             let at = character(source, node.range().start);
-            return Err(Diagnostic::error("robot/xml-depth", message).at(&at));
+            return Err(Diagnostic::error("robot/xml-depth", message).at(&at).into());
         }
         depths.resize(node.id().get_usize(), 0);
         depths.push(depth);
@@ -235,8 +235,11 @@ impl Check<'_> {
             self.only_one(joint, part);
         }
         self.origin(joint);
+        // Axis and limits of a fixed joint mean nothing; exporters write zeros there.
+        let kind = joint.attribute("type").unwrap_or_default();
         if let Some(axis) = joint.children().find(|n| n.has_tag_name("axis"))
             && let Some(xyz) = self.numbers(axis, "xyz", 3, true)
+            && kind != "fixed"
             && xyz.iter().map(|v| v * v).sum::<f64>().sqrt() < 1e-9
         {
             self.fault("robot/axis", format!("joint `{name}` has an axis of zero length"), &self.start(axis));
@@ -244,6 +247,7 @@ impl Check<'_> {
         if let Some(limit) = joint.children().find(|n| n.has_tag_name("limit")) {
             let bounds = ["lower", "upper"].map(|key| self.numbers(limit, key, 1, false));
             if let [Some(lower), Some(upper)] = &bounds
+                && matches!(kind, "revolute" | "prismatic")
                 && lower[0] > upper[0]
             {
                 let message = format!("joint `{name}`: lower limit {} is above the upper one, {}", lower[0], upper[0]);
@@ -328,6 +332,9 @@ impl Check<'_> {
 /// for it before version 1.2, but published files leave it out on joints that never move.
 fn reduced(text: &str, root: Node) -> String {
     let mut edits: Vec<(Range<usize>, &str)> = Vec::new();
+    if text.starts_with('\u{feff}') {
+        edits.push((0..'\u{feff}'.len_utf8(), ""));
+    }
     let old = !root.attribute("version").is_some_and(|v| {
         let (major, minor) = v.trim().split_once('.').unwrap_or(("1", "0"));
         matches!((major.parse::<u32>(), minor.parse::<u32>()), (Ok(major), Ok(minor)) if (major, minor) >= (1, 2))

@@ -14,6 +14,7 @@ fn code(urdf: &str, spec: &RobotSpec) -> &'static str {
 fn faults_of_the_text_are_found_with_their_place() {
     let good = with_wheels(&limb("j", "revolute", "base", "l", LIMIT));
     assert!(read(&good, &RobotSpec::default()).is_ok());
+    assert!(read(&format!("\u{feff}{good}"), &RobotSpec::default()).is_ok());
     let deep = "<a>".repeat(100) + &"</a>".repeat(100);
     for (from, to, code) in [
         ("</robot>", "", "robot/xml"),
@@ -50,6 +51,19 @@ fn faults_of_the_text_are_found_with_their_place() {
     assert_eq!(code("", &RobotSpec::default()), "robot/xml");
     let xacro = fault("<robot><xacro:macro/></robot>", &RobotSpec::default());
     assert!(xacro.hint.unwrap().contains("run xacro first"));
+}
+
+#[test]
+fn what_exporters_write_without_meaning_is_no_fault() {
+    for inside in [
+        r#"<axis xyz="0 0 0"/><limit lower="0" upper="0" effort="0" velocity="0"/>"#,
+        r#"<limit lower="1" upper="-1" effort="x"/><safety_controller/><dynamics damping="x"/>"#,
+    ] {
+        let more = limb("j", "fixed", "base", "l", inside) + "<gazebo><plugin/></gazebo><transmission/><material/>";
+        assert!(read(&with_wheels(&more), &RobotSpec::default()).is_ok(), "{inside}");
+    }
+    let inertia = with_wheels("").replacen("<collision>", "<inertial/><visual/><collision>", 1);
+    assert!(read(&inertia, &RobotSpec::default()).is_ok());
 }
 
 #[test]
