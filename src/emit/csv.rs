@@ -76,7 +76,7 @@ pub fn write(table: &CommandTable, header: &CsvHeader) -> String {
     text
 }
 
-/// The bytes of `path_error.csv`; an unknown clearance is an empty cell.
+/// The bytes of `path_error.csv`; a clearance that is unknown or without bound is an empty cell.
 pub fn write_path_error(rows: &[PathErrorRow]) -> String {
     let columns = [
         "sampling_time_s",
@@ -96,7 +96,7 @@ pub fn write_path_error(rows: &[PathErrorRow]) -> String {
             number(row.lateral_rms_m),
             number(row.end_point_m),
             number(row.end_heading_rad),
-            row.clearance_min_m.map(number).unwrap_or_default(),
+            row.clearance_min_m.filter(|c| c.is_finite()).map(number).unwrap_or_default(),
         ]);
     }
     text

@@ -69,7 +69,7 @@ const STANDING: f64 = 1e-9;
 
 /// Metrics of a trajectory in its own timing: the parameter of its curves must be seconds, so not for given paths.
 /// Derivatives are the polynomials' own. The base jerk is the norm of sigma's third derivative, the angular acceleration
-/// [SCR] Eq. 3d (corrected). A [`StillLeg`] has no timing: it contributes a trapezoid of speed within the robot's limits.
+/// \[SCR\] Eq. 3d (corrected). A [`StillLeg`] has no timing: it contributes a trapezoid of speed within the robot's limits.
 pub fn of_trajectory(trajectory: &Trajectory, robot: &RobotModel) -> Metrics {
     let mut sum = Integrals::default();
     for leg in &trajectory.legs {
