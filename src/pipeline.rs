@@ -502,6 +502,34 @@ pub fn check(inputs: &mut Inputs, table: &CommandTable) -> Result<Certificate, D
     Ok(certify::certify(table, &robot, map.as_ref(), &task))
 }
 
+/// The path error of commands as they are written: their replay against the mission's given path, or, where the path was
+/// planned, against the table's own planned poses.
+///
+/// # Errors
+/// Bad inputs.
+pub fn path_error_of_commands(inputs: &mut Inputs, table: &CommandTable) -> Result<crate::report::PathErrorRow, Diagnostics> {
+    let World { robot, .. } = world(inputs)?;
+    let mission = &inputs.mission;
+    let Some(first) = table.rows.first() else {
+        return Err(Diagnostic::error("check/empty", "the command file has no row").into());
+    };
+    let trajectory = match &mission.path {
+        Some(path) => given_path(mission, path, inputs.path_csv.as_ref(), &robot)?,
+        None => planned_poses(table),
+    };
+    let options = RetimeOptions { law: crate::mission::TimeLaw::Auto, sampling_time: table.sampling_time };
+    let reference = path_error::PathReference::new(&retime::retime(&trajectory, &robot, &options)?);
+    let (start, _) = start_of(&trajectory);
+    let start = if mission.path.is_some() { start } else { first.pose };
+    Ok((&path_error::path_error_of_table(table, start, &reference)).into())
+}
+
+/// The planned poses of a table as straight drives and spins: what is left of a plan in a command file.
+fn planned_poses(table: &CommandTable) -> Trajectory {
+    let states = table.rows.iter().map(|row| (row.pose, row.joint_positions.clone())).collect::<Vec<_>>();
+    crate::trajectory::through_poses(&states)
+}
+
 /// Length and time of the mission's held commands; for tools.
 pub fn driven(commands: &CommandTable) -> Metrics {
     metrics::of_commands(commands)

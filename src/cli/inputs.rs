@@ -17,12 +17,19 @@ use crate::robot::spec;
 pub struct Disk {
     /// Path and hash of each file read, in order.
     read: Rc<RefCell<Vec<(PathBuf, blake3::Hash)>>>,
+    /// What the robot stage read.
+    meshes: Rc<RefCell<Vec<(String, Vec<u8>)>>>,
 }
 
 impl Disk {
     /// Paths of all files read so far, in order, each once.
     pub fn paths(&self) -> Vec<PathBuf> {
         self.read.borrow().iter().map(|(path, _)| path.clone()).collect()
+    }
+
+    /// Meshes read so far: name by which the robot stage asked for each, and bytes.
+    pub fn meshes(&self) -> Vec<(String, Vec<u8>)> {
+        self.meshes.borrow().clone()
     }
 
     fn bytes(&self, path: &Path) -> io::Result<Vec<u8>> {
@@ -74,7 +81,13 @@ impl Disk {
 
 impl Files for Disk {
     fn read(&mut self, path: &Path) -> io::Result<Vec<u8>> {
-        self.bytes(path)
+        let bytes = self.bytes(path)?;
+        let name = path.display().to_string();
+        let mut meshes = self.meshes.borrow_mut();
+        if !meshes.iter().any(|(known, _)| *known == name) {
+            meshes.push((name, bytes.clone()));
+        }
+        Ok(bytes)
     }
 }
 

@@ -1,6 +1,93 @@
-//! One file per subcommand.
+//! The command line: one file per subcommand. Exit codes: 0 done and certified, 1 no trajectory or no certificate, 2 bad
+//! input or usage.
 
+pub mod check;
+pub mod compile;
 pub mod completions;
 pub mod inputs;
+pub mod inspect;
 pub mod output;
+pub mod path_error;
 pub mod schema;
+pub mod terminal;
+
+use clap::{CommandFactory, Parser, Subcommand};
+
+use crate::diag::{Diagnostics, Severity};
+use terminal::Terminal;
+
+/// The motion compiler for robots that change shape.
+///
+/// Reads a robot (URDF: a differential-drive base and shape-changing joints), a map and a mission, and writes an executable motion
+/// file with a certificate: proven clearance, wheel and joint limits, and end point of the commands as written.
+#[derive(Debug, Parser)]
+#[command(name = "trajc", version, propagate_version = true, max_term_width = 100)]
+struct Args {
+    /// No progress on the terminal.
+    #[arg(long, short, global = true)]
+    quiet: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Compile(compile::CompileArgs),
+    Check(check::CheckArgs),
+    PathError(path_error::PathErrorArgs),
+    Inspect(inspect::InspectArgs),
+    Schema(schema::SchemaArgs),
+    /// Print the completion script of a shell.
+    Completions {
+        /// Which shell.
+        shell: clap_complete::Shell,
+    },
+}
+
+/// Runs the program with the process's arguments; its exit code.
+pub fn main() -> u8 {
+    let args = match Args::try_parse() {
+        Ok(args) => args,
+        Err(error) => {
+            let _ = error.print();
+            return u8::try_from(error.exit_code()).unwrap_or(2);
+        }
+    };
+    let mut terminal = Terminal::new();
+    terminal.quiet = args.quiet;
+    let result = match &args.command {
+        Command::Compile(args) => compile::compile(args, &mut terminal),
+        Command::Check(args) => check::check(args, &mut terminal),
+        Command::PathError(args) => path_error::path_error(args, &mut terminal),
+        Command::Inspect(args) => inspect::inspect(args, &mut terminal),
+        Command::Schema(args) => schema::schema(args, &mut terminal),
+        Command::Completions { shell } => {
+            terminal.print(&completions::text(*shell, &mut Args::command()));
+            Ok(0)
+        }
+    };
+    match result {
+        Ok(code) => code,
+        Err(diagnostics) => {
+            terminal.complain(&diagnostics);
+            exit_code(&diagnostics)
+        }
+    }
+}
+
+fn exit_code(diagnostics: &Diagnostics) -> u8 {
+    match diagnostics.severity() {
+        Severity::NoTrajectory => 1,
+        Severity::BadInput => 2,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Args::command().debug_assert();
+    }
+}

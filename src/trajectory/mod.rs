@@ -90,3 +90,51 @@ pub struct StillLeg {
     /// Joint values at the end.
     pub joints_to: Vec<f64>,
 }
+
+/// Straight drives between poses with spins in between: a trajectory through the positions of a sampled motion. Joints are
+/// carried along in proportion.
+pub fn through_poses(states: &[(Pose2, Vec<f64>)]) -> Trajectory {
+    let mut legs = Vec::new();
+    let mut yaw = states.first().map_or(0.0, |(pose, _)| pose.yaw);
+    for pair in states.windows(2) {
+        let ((from, joints_from), (to, joints_to)) = (&pair[0], &pair[1]);
+        let (dx, dy) = (to.x - from.x, to.y - from.y);
+        let length = dx.hypot(dy);
+        if length < 1e-9 {
+            let still = StillLeg {
+                pose: Pose2 { yaw, ..*from },
+                yaw_end: to.yaw,
+                joints_from: joints_from.clone(),
+                joints_to: joints_to.clone(),
+            };
+            yaw = to.yaw;
+            legs.push(Leg::Still(still));
+            continue;
+        }
+        let middle = 0.5 * (from.yaw + to.yaw);
+        let direction = dy.atan2(dx);
+        let reverse = crate::geom::wrap_angle(direction - middle).abs() > std::f64::consts::FRAC_PI_2;
+        let heading = direction + if reverse { std::f64::consts::PI } else { 0.0 };
+        let heading = crate::geom::unwrap_near(heading, middle);
+        if (heading - yaw).abs() > 1e-12 {
+            let still = StillLeg {
+                pose: Pose2 { yaw, ..*from },
+                yaw_end: heading,
+                joints_from: joints_from.clone(),
+                joints_to: joints_from.clone(),
+            };
+            legs.push(Leg::Still(still));
+        }
+        yaw = heading;
+        let linear = |a: f64, b: f64| vec![a, (b - a) / length];
+        let mut coefficients = vec![linear(from.x, to.x), linear(from.y, to.y)];
+        coefficients.extend(joints_from.iter().zip(joints_to).map(|(a, b)| linear(*a, *b)));
+        let piece = crate::math::poly::Piece { duration: length, coefficients };
+        legs.push(Leg::Drive(DriveLeg { curve: PiecewisePoly { pieces: vec![piece] }, reverse, yaw_start: heading }));
+    }
+    if legs.is_empty() {
+        let (pose, joints) = states.first().cloned().unwrap_or_default();
+        legs.push(Leg::Still(StillLeg { pose, yaw_end: pose.yaw, joints_from: joints.clone(), joints_to: joints }));
+    }
+    Trajectory { legs, source: TrajectorySource::Given, optimiser: None }
+}

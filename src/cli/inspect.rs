@@ -1,0 +1,165 @@
+//! `trajc inspect FILE`.
+
+use std::path::{Path, PathBuf};
+
+use super::check::read_commands;
+use super::inputs::{self, Disk, read_map_file, read_robot_files};
+use super::terminal::Terminal;
+use crate::diag::{Diagnostic, Diagnostics};
+use crate::map::{self, MapInputs};
+use crate::mission::{LimitsSpec, MapSpec, Unknown};
+use crate::pipeline;
+use crate::report::metrics;
+use crate::robot::{self, RobotInputs};
+
+/// Print what the program understood of a URDF, robot.yaml, map, mission or command file.
+#[derive(Debug, clap::Args)]
+pub struct InspectArgs {
+    /// .urdf, robot.yaml, a mission, a map, commands.csv or commands.mcap.
+    file: PathBuf,
+    /// Cell size of point clouds, in metres.
+    #[arg(long, value_name = "M", default_value_t = 0.05)]
+    resolution: f64,
+    /// Slab of a map that holds obstacles, in metres.
+    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 2, default_values_t = [0.02, 2.0])]
+    height: Vec<f64>,
+}
+
+/// What a .yaml is, by its keys.
+enum YamlKind {
+    Mission,
+    Robot,
+    Map,
+}
+
+/// Prints.
+///
+/// # Errors
+/// Bad input.
+pub fn inspect(args: &InspectArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics> {
+    let path = args.file.as_path();
+    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let text = match ending.as_str() {
+        "urdf" => of_robot(path)?,
+        "mcap" => of_commands(path)?,
+        "csv" if starts_as_commands(path)? => of_commands(path)?,
+        "yaml" | "yml" => match kind_of_yaml(path)? {
+            YamlKind::Mission => of_mission(path)?,
+            YamlKind::Robot => of_robot(path)?,
+            YamlKind::Map => of_map(args, path)?,
+        },
+        _ => of_map(args, path)?,
+    };
+    terminal.print(&text);
+    Ok(0)
+}
+
+fn kind_of_yaml(path: &Path) -> Result<YamlKind, Diagnostics> {
+    let text = Disk::default().text(path, None)?.text;
+    let has = |key: &str| text.lines().any(|line| line.starts_with(key) && line[key.len()..].trim_start().starts_with(':'));
+    if has("image") && has("resolution") {
+        Ok(YamlKind::Map)
+    } else if has("urdf") || has("drive") {
+        Ok(YamlKind::Robot)
+    } else {
+        Ok(YamlKind::Mission)
+    }
+}
+
+fn starts_as_commands(path: &Path) -> Result<bool, Diagnostics> {
+    let bytes = Disk::default().binary(path, None)?;
+    let head = String::from_utf8_lossy(&bytes[..bytes.len().min(4096)]).into_owned();
+    Ok(head.contains("# format: trajc.commands") || head.contains("wheel_left_rad_s"))
+}
+
+fn of_robot(path: &Path) -> Result<String, Diagnostics> {
+    let disk = Disk::default();
+    let (spec, _, urdf) = read_robot_files(path, &disk, None)?;
+    let overrides = LimitsSpec::default();
+    let mut files = disk.clone();
+    let robot =
+        robot::parse(RobotInputs { spec: &spec, urdf: (&urdf.name, &urdf.text), files: &mut files, overrides: &overrides })?;
+    Ok(robot.describe())
+}
+
+fn of_map(args: &InspectArgs, path: &Path) -> Result<String, Diagnostics> {
+    let height = [args.height[0], args.height[1]];
+    if !(height[0] < height[1] && args.resolution > 0.0) {
+        let message = format!("--height {} {} is no slab", height[0], height[1]);
+        return Err(Diagnostic::error("inspect/height", message).hint("give the lower end first, metres").into());
+    }
+    let file = read_map_file(path, &Disk::default(), None)?;
+    let points = !["yaml", "yml", "npy"].iter().any(|e| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(e)));
+    let spec = MapSpec {
+        file: path.to_path_buf(),
+        resolution: points.then_some(args.resolution),
+        height: Some(height),
+        unknown: Unknown::Occupied,
+        origin: None,
+    };
+    let beside = file.beside.as_ref().map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
+    let map = map::parse(&MapInputs { name: &file.name, bytes: &file.bytes, beside }, &spec, height[1])?;
+    Ok(map.describe())
+}
+
+fn of_mission(path: &Path) -> Result<String, Diagnostics> {
+    let (mut inputs, disk) = inputs::read(path)?;
+    let world = pipeline::world(&mut inputs)?;
+    let mission = &inputs.mission;
+    let mut out = format!("mission {}\n", mission.name);
+    let pose = |p: &crate::mission::PoseSpec| {
+        let number = |v: Option<f64>| v.map_or("free".to_owned(), |v| format!("{v}"));
+        let joints: Vec<String> = p.joints.iter().map(|(name, v)| format!("{name} {v}")).collect();
+        format!("x {} m, y {} m, yaw {} rad {}", number(p.x), number(p.y), number(p.yaw), joints.join(", "))
+    };
+    for (name, spec) in [("start", &mission.start), ("goal", &mission.goal)] {
+        if let Some(spec) = spec {
+            out += &format!("  {name:<10} {}\n", pose(spec));
+        }
+    }
+    out += &format!("  clearance  {} m, sampling time {} s\n", mission.clearance, mission.sampling_time);
+    out += "  reads     ";
+    for file in disk.paths() {
+        out += &format!(" {}", file.display());
+    }
+    out += "\n\n";
+    out += &world.robot.describe();
+    if let Some(map) = &world.map {
+        out += "\n";
+        out += &map.describe();
+    }
+    Ok(out)
+}
+
+fn of_commands(path: &Path) -> Result<String, Diagnostics> {
+    let file = read_commands(path)?;
+    let table = &file.table;
+    let driven = metrics::of_commands(table);
+    let mut out = format!("commands {}\n", path.display());
+    out += &format!("  mission    {}\n  robot      {}\n", file.header.mission, file.header.robot);
+    if let Some(map) = &file.header.map {
+        out += &format!("  map        {map}\n");
+    }
+    out += &format!("  inputs     blake3 {}\n", file.header.inputs_blake3);
+    out += &format!(
+        "  rows       {} of {} s, {} s in all, sampling {}\n",
+        table.rows.len(),
+        table.sampling_time,
+        table.duration(),
+        crate::report::names::sampling(table.sampling)
+    );
+    out += &format!("  wheels     radius {} m, track {} m\n", table.wheel_radius, table.track_width);
+    let joints: Vec<&str> = table.joints.iter().map(|(name, _)| name.as_str()).collect();
+    out += &format!("  joints     {}\n", if joints.is_empty() { "none".to_owned() } else { joints.join(", ") });
+    out += &format!("  drives     {:.3} m\n", driven.length_m);
+    for (name, row) in [("from", table.rows.first()), ("to", table.rows.last())] {
+        if let Some(row) = row {
+            out += &format!("  {name:<10} x {:.4} m, y {:.4} m, yaw {:.4} rad", row.pose.x, row.pose.y, row.pose.yaw);
+            for ((joint, _), value) in table.joints.iter().zip(&row.joint_positions) {
+                out += &format!(", {joint} {value:.4}");
+            }
+            out += "\n";
+        }
+    }
+    Ok(out)
+}

@@ -1,0 +1,71 @@
+//! Where results and diagnostics go: results to stdout, diagnostics and progress to stderr.
+
+use std::io::{IsTerminal, Write};
+
+use indicatif::ProgressBar;
+
+use crate::diag::{Diagnostics, render};
+
+/// The user's terminal, or the pipe in its place.
+pub struct Terminal {
+    colour: bool,
+    /// Asked for no progress (`--quiet`).
+    pub quiet: bool,
+}
+
+impl Terminal {
+    /// Colour only on a terminal, and never where `NO_COLOR` is set.
+    pub fn new() -> Self {
+        let wanted = std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty());
+        Self { colour: wanted && std::io::stderr().is_terminal(), quiet: false }
+    }
+
+    /// A result. A reader that has gone away is no error of ours.
+    pub fn print(&mut self, text: &str) {
+        let _ = std::io::stdout().write_all(text.as_bytes());
+    }
+
+    /// Diagnostics.
+    pub fn complain(&mut self, diagnostics: &Diagnostics) {
+        let _ = std::io::stderr().write_all(render(diagnostics, self.colour).as_bytes());
+    }
+
+    /// A line that names the stage at work; only on a terminal, gone when it is dropped.
+    pub fn progress(&self, what: &str) -> Progress {
+        if self.quiet || !std::io::stderr().is_terminal() {
+            return Progress(None);
+        }
+        let bar = ProgressBar::new_spinner();
+        bar.set_prefix(what.to_owned());
+        let style = indicatif::ProgressStyle::with_template("{spinner} {prefix}: {msg} {elapsed}");
+        bar.set_style(style.unwrap_or_else(|_| indicatif::ProgressStyle::default_spinner()));
+        bar.enable_steady_tick(std::time::Duration::from_millis(100));
+        Progress(Some(bar))
+    }
+}
+
+impl Default for Terminal {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// A progress line.
+pub struct Progress(Option<ProgressBar>);
+
+impl Progress {
+    /// Names the stage.
+    pub fn stage(&self, name: &'static str) {
+        if let Some(bar) = &self.0 {
+            bar.set_message(name);
+        }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.0 {
+            bar.finish_and_clear();
+        }
+    }
+}
