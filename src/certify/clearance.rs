@@ -25,7 +25,7 @@ const REACHES: [f64; 3] = [0.1, 0.4, 1.6];
 /// Rows between those looked at first, for an early idea of the least distance.
 const STRIDE: usize = 16;
 /// Evaluations (a column or a box counts for a part of one) after which what is not proven is refused: some seconds.
-const WORK: u64 = 20_000_000;
+const WORK: u64 = 5_000_000;
 
 /// What was proven and found.
 pub(super) struct Clearance {
@@ -250,7 +250,7 @@ impl<'a> Search<'a> {
             let separation = shape.posed.separation(&nearest);
             let Some(normal) = separation.normal else {
                 let depth = shape.posed.depth(&nearest);
-                self.witness(at, at.tau, Some(nearest), -depth);
+                self.witness(at, at.tau, Some(nearest), 0.0 - depth);
                 self.boxes.clear();
                 break;
             };
@@ -334,7 +334,7 @@ impl<'a> Search<'a> {
         let distance = match obstacle {
             Some(obstacle) => {
                 let found = posed.separation(obstacle);
-                if found.normal.is_some() { found.upper } else { -posed.depth(obstacle) }
+                if found.normal.is_some() { found.upper } else { 0.0 - posed.depth(obstacle) }
             }
             None => {
                 let bounds = posed.bounds();

@@ -1,7 +1,7 @@
 //! Whether the motion ends at the goal.
 
 use super::rollout::Rollout;
-use super::{END_ANGLE_TOLERANCE, END_POINT_TOLERANCE, Goal, Refusal, RefusalKind};
+use super::{END_ANGLE_TOLERANCE, END_POINT_TOLERANCE, Goal, Refusal, RefusalKind, within};
 use crate::geom::wrap_angle;
 use crate::robot::RobotModel;
 
@@ -23,8 +23,7 @@ pub(super) fn ends(rollout: &Rollout<'_>, robot: &RobotModel, goal: &Goal) -> En
     let heading = goal.yaw.map(|yaw| wrap_angle(pose.yaw - yaw).abs());
     let mut refusals = Vec::new();
     let mut refuse = |error: f64, tolerance: f64, message: &dyn Fn() -> String| {
-        // Not `>`: an error that is not a number must not pass.
-        if !(error <= tolerance) {
+        if !within(error, tolerance) {
             refusals.push(Refusal { kind: RefusalKind::End, message: message(), time: Some(rollout.time(last, 0.0)) });
         }
     };

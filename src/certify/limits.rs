@@ -1,7 +1,7 @@
 //! Limits: speed, and first and second differences of the held speeds over the sampling time, at rest before and after.
 
 use super::rollout::Rollout;
-use super::{LimitCheck, Refusal, RefusalKind};
+use super::{LimitCheck, Refusal, RefusalKind, within};
 use crate::command::CommandTable;
 use crate::robot::{MotionLimits, RobotModel};
 
@@ -24,10 +24,9 @@ pub(super) fn limits(table: &CommandTable, robot: &RobotModel) -> (Vec<LimitChec
     let (mut checks, mut refusals) = (Vec::new(), Vec::new());
     for (name, in_metres, limit, speeds) in actuators {
         for (peak, (quantity, bound, power)) in peaks(&speeds, table.sampling_time).into_iter().zip(quantities(limit)) {
-            // Not `>`: a peak that is not a number must not pass.
-            if bound.is_some_and(|bound| !(peak.magnitude <= bound * (1.0 + RELATIVE))) {
+            if let Some(bound) = bound.filter(|bound| !within(peak.magnitude, bound * (1.0 + RELATIVE))) {
                 let unit = format!("{}/s{power}", if in_metres { "m" } else { "rad" });
-                let (time, bound) = (table.time(peak.row), bound.unwrap_or(f64::NAN));
+                let time = table.time(peak.row);
                 let over = 100.0 * (peak.magnitude / bound - 1.0);
                 let message = format!(
                     "`{name}`: {quantity} {:.6} {unit} at t = {time:.3} s, limit {bound:.6} {unit} ({over:.3} % over)",
@@ -57,7 +56,7 @@ fn peaks(speeds: &[f64], step: f64) -> [Peak; 3] {
         let mut peak = Peak { magnitude: 0.0, row: 0 };
         for k in 0..speeds.len() + 2 {
             let magnitude = value(k).abs();
-            if !(magnitude <= peak.magnitude) {
+            if magnitude > peak.magnitude {
                 peak = Peak { magnitude, row: k.min(speeds.len().saturating_sub(1)) };
             }
         }
@@ -77,7 +76,7 @@ pub(super) fn positions(rollout: &Rollout<'_>, robot: &RobotModel) -> Vec<Refusa
         let beyond = |q: f64| (joint.lower - q).max(q - joint.upper);
         let values = (0..rollout.rows()).map(|row| (row, rollout.joints(row)[index]));
         let worst = values.max_by(|a, b| beyond(a.1).total_cmp(&beyond(b.1)));
-        let Some((row, value)) = worst.filter(|(_, q)| !(beyond(*q) <= POSITION)) else { continue };
+        let Some((row, value)) = worst.filter(|(_, q)| !within(beyond(*q), POSITION)) else { continue };
         let (time, unit) = (rollout.time(row, 0.0), if joint.prismatic { "m" } else { "rad" });
         let message = format!(
             "`{}`: position {value:.6} {unit} at t = {time:.3} s is outside its range {:.6} to {:.6} {unit}",

@@ -132,6 +132,11 @@ pub struct LimitCheck {
     pub limit: Option<f64>,
 }
 
+/// Whether a figure is within its bound. Figures that are not numbers are not.
+fn within(figure: f64, bound: f64) -> bool {
+    figure <= bound
+}
+
 /// Judges a command table: replays it from the task's start and checks table, limits, ends and, with a map, clearance.
 ///
 /// A table that cannot be replayed (no rows, numbers that are not finite, joints that are not the robot's) is refused with

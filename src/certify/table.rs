@@ -1,7 +1,7 @@
 //! Whether a command table makes sense at all, before anything is judged by it.
 
 use super::rollout::Rollout;
-use super::{Refusal, RefusalKind, Task};
+use super::{Refusal, RefusalKind, Task, within};
 use crate::command::CommandTable;
 use crate::geom::wrap_angle;
 use crate::robot::RobotModel;
@@ -45,7 +45,7 @@ pub(super) fn unreadable(table: &CommandTable, robot: &RobotModel, task: &Task) 
         ("track width", table.track_width, robot.track_width),
     ] {
         fault(
-            !((own - robots).abs() <= SAME_WHEELS),
+            !within((own - robots).abs(), SAME_WHEELS),
             &|| format!("the table's {what} is {own} m, the robot's {robots} m"),
             None,
         );
@@ -106,7 +106,7 @@ pub(super) fn contradictions(
         (first.pose.y - task.start.y).abs(),
         wrap_angle(first.pose.yaw - task.start.yaw).abs(),
     ];
-    if off.iter().any(|e| !(*e <= CONSISTENT)) {
+    if off.iter().any(|e| !within(*e, CONSISTENT)) {
         let message = format!(
             "the first row's pose is off the start by ({:.2e} m, {:.2e} m, {:.2e} rad)",
             off[0], off[1], off[2]
@@ -116,7 +116,7 @@ pub(super) fn contradictions(
     for (index, joint) in robot.joints.iter().enumerate() {
         let error = |k: usize| (table.rows[k].joint_positions[index] - rollout.joints(k)[index]).abs();
         let worst = (0..table.rows.len()).max_by(|a, b| error(*a).total_cmp(&error(*b)));
-        if let Some(k) = worst.filter(|k| !(error(*k) <= CONSISTENT)) {
+        if let Some(k) = worst.filter(|k| !within(error(*k), CONSISTENT)) {
             let (time, error) = (table.time(k), error(k));
             let message =
                 format!("`{}`: position is off its integrated speed by {error:.2e} at t = {time:.3} s", joint.name);
