@@ -11,7 +11,7 @@ use super::collide::{BaseMotion, Collider};
 use super::heuristic::CostToGo;
 use super::lattice::{HEADINGS, Lattice, LatticeState, heading_angle, nearest_heading};
 use super::posture::Bits;
-use super::route::Route;
+use super::route::{Grain, Route};
 use super::{Query, SearchOptions};
 use crate::geom::{Pose2, wrap_angle};
 
@@ -216,7 +216,7 @@ impl<const W: usize> AStar<'_, W> {
             let mut route = Route::new(from);
             route.drive_to([goal.x, goal.y], reverse);
             route.end_with(self.query.goal_yaw);
-            let pieces = route.pieces();
+            let pieces = route.pieces(Grain::COARSE);
             (route, pieces, reverse)
         })
     }
@@ -282,7 +282,7 @@ impl<const W: usize> AStar<'_, W> {
                     }
                     let heading = nearest_heading(route.end_yaw());
                     route.end_with(Some(heading_angle(heading)));
-                    let postures = self.pass(self.start_postures, route.pieces());
+                    let postures = self.pass(self.start_postures, route.pieces(Grain::COARSE));
                     if !postures.is_empty() {
                         let state = LatticeState { i, j, heading };
                         let cost = route.cost(TURN_COST, REVERSE_COST);
@@ -323,7 +323,7 @@ impl<const W: usize> AStar<'_, W> {
                     let mut route = Route::new(pose);
                     route.drive_to(self.lattice.position(i, j), reverse);
                     route.end_with(Some(pose.yaw));
-                    route.pieces()
+                    route.pieces(Grain::COARSE)
                 };
                 let more = drive.length * if reverse { REVERSE_COST } else { 1.0 };
                 let edge = self.key(state) * 8 + 1 + 2 * index as u64 + u64::from(reverse);

@@ -25,6 +25,7 @@ pub use collide::Contact;
 use collide::{BaseMotion, Collider};
 use lattice::Lattice;
 use posture::{Bits, PostureGrid};
+use route::Grain;
 use shortcut::Shortcutter;
 
 /// A path on the lattice, joined to the exact start and goal. Between consecutive states the motion is linear in joint
@@ -290,12 +291,17 @@ fn search_postures<const W: usize>(
             return Err(SearchError::Exhausted { expanded, closest, narrowest, core: ball.1 + clearance });
         }
     };
-    let shortcutter =
-        Shortcutter { collider: &collider, start_postures, goal_postures, open_end: query.goal_yaw.is_none() };
-    // The search checked the same sweeps, cut at other places: a route may fail here only by the tolerance of the checks.
-    let checked = shortcutter.check(route).ok_or(SearchError::Limit { labels: expanded })?;
-    let checked = shortcutter.shorten(checked);
-    Ok(with_joints(&collider, robot, query, &checked, start_postures, goal_postures, expanded))
+    let open_end = query.goal_yaw.is_none();
+    for grain in [Grain::COARSE, Grain::FINE] {
+        let shortcutter = Shortcutter { collider: &collider, start_postures, goal_postures, open_end, grain };
+        if let Some(checked) = shortcutter.check(route.clone()) {
+            let checked = shortcutter.shorten(checked);
+            let pieces = checked.route.pieces(grain);
+            return Ok(with_joints(&collider, robot, query, &checked, &pieces, [start_postures, goal_postures], expanded));
+        }
+    }
+    // The fine check asks no more than the search did, but for the tolerance of the checks.
+    Err(SearchError::Limit { labels: expanded })
 }
 
 /// Postures that are free in a pose and agree with what is asked for; else what is in the way of the posture asked for.
@@ -354,11 +360,10 @@ fn with_joints<const W: usize>(
     robot: &RobotModel,
     query: &Query,
     checked: &shortcut::CheckedRoute<W>,
-    start_postures: Bits<W>,
-    goal_postures: Bits<W>,
+    pieces: &[BaseMotion],
+    [start_postures, goal_postures]: [Bits<W>; 2],
     expanded: usize,
 ) -> SearchPath {
-    let pieces = checked.route.pieces();
     let masks = checked.masks();
     let rates: Vec<usize> = pieces.iter().map(|piece| steps_in_time(robot, &collider.grid, piece)).collect();
     let postures =
@@ -374,7 +379,7 @@ fn with_joints<const W: usize>(
         expanded,
     };
     path.then_to(SearchState { pose: query.start, joints: collider.grid.joints(first) }, SearchMove::Still);
-    let drive_reverse = reverse_of_pieces(&checked.route, &pieces);
+    let drive_reverse = reverse_of_pieces(&checked.route, pieces);
     for (k, piece) in pieces.iter().enumerate() {
         let kind = match drive_reverse[k] {
             None => SearchMove::Still,

@@ -3,9 +3,19 @@
 use super::collide::BaseMotion;
 use crate::geom::{Pose2, wrap_angle};
 
-/// Longest drive and largest turn that are checked as one sweep: shorter ones let postures change more often.
-const PIECE_LENGTH: f64 = 0.25;
-const PIECE_TURN: f64 = 15.0 * std::f64::consts::PI / 180.0;
+/// Longest drive (m) and largest turn (rad) that are checked as one sweep. Shorter ones let postures change more often.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Grain {
+    pub drive: f64,
+    pub turn: f64,
+}
+
+impl Grain {
+    /// Few sweeps.
+    pub const COARSE: Self = Self { drive: 0.25, turn: 15.0 * std::f64::consts::PI / 180.0 };
+    /// Not longer than the lattice's own moves: whatever the search got through, this does.
+    pub const FINE: Self = Self { drive: 0.04, turn: 4.0 * std::f64::consts::PI / 180.0 };
+}
 
 /// Corner 0 is the start; drive k leads from corner k to corner k + 1; the turn at corner k comes before drive k. The last
 /// turn is at the last corner.
@@ -76,28 +86,28 @@ impl Route {
     }
 
     /// All motions in order, cut into pieces.
-    pub fn pieces(&self) -> Vec<BaseMotion> {
+    pub fn pieces(&self, grain: Grain) -> Vec<BaseMotion> {
         let mut out = Vec::new();
         let mut yaw = self.start_yaw;
         for (k, corner) in self.corners.iter().enumerate() {
-            spin_pieces(Pose2::new(corner[0], corner[1], yaw), self.turns[k], &mut out);
+            spin_pieces(Pose2::new(corner[0], corner[1], yaw), self.turns[k], grain, &mut out);
             yaw += self.turns[k];
             if let Some(next) = self.corners.get(k + 1) {
-                drive_pieces(Pose2::new(corner[0], corner[1], yaw), Pose2::new(next[0], next[1], yaw), &mut out);
+                drive_pieces(Pose2::new(corner[0], corner[1], yaw), Pose2::new(next[0], next[1], yaw), grain, &mut out);
             }
         }
         out
     }
 }
 
-pub(super) fn spin_pieces(from: Pose2, turn: f64, out: &mut Vec<BaseMotion>) {
-    let count = (turn.abs() / PIECE_TURN - 1e-9).ceil() as usize;
+pub(super) fn spin_pieces(from: Pose2, turn: f64, grain: Grain, out: &mut Vec<BaseMotion>) {
+    let count = (turn.abs() / grain.turn - 1e-9).ceil() as usize;
     let at = |k: usize| Pose2 { yaw: from.yaw + turn * k as f64 / count as f64, ..from };
     out.extend((0..count).map(|k| BaseMotion { from: at(k), to: at(k + 1) }));
 }
 
-pub(super) fn drive_pieces(from: Pose2, to: Pose2, out: &mut Vec<BaseMotion>) {
-    let count = (from.distance(to) / PIECE_LENGTH - 1e-9).ceil() as usize;
+pub(super) fn drive_pieces(from: Pose2, to: Pose2, grain: Grain, out: &mut Vec<BaseMotion>) {
+    let count = (from.distance(to) / grain.drive - 1e-9).ceil() as usize;
     let at = |k: usize| {
         let share = k as f64 / count as f64;
         Pose2::new(from.x + share * (to.x - from.x), from.y + share * (to.y - from.y), from.yaw)
@@ -117,7 +127,7 @@ mod tests {
             let mut route = Route::new(start);
             points.iter().for_each(|p| route.drive_to([p.0, p.1], p.2));
             route.end_with(Some(1.0));
-            let pieces = route.pieces();
+            let pieces = route.pieces(Grain::COARSE);
             let mut at = start;
             for piece in &pieces {
                 prop_assert!(piece.from.distance(at) < 1e-9 && (piece.from.yaw - at.yaw).abs() < 1e-9);

@@ -3,7 +3,7 @@
 use super::astar::TURN_COST;
 use super::collide::{BaseMotion, Collider};
 use super::posture::Bits;
-use super::route::{Route, drive_pieces, spin_pieces};
+use super::route::{Grain, Route, drive_pieces, spin_pieces};
 use crate::geom::{Pose2, wrap_angle};
 
 /// A route with the free postures of each of its motions.
@@ -21,6 +21,7 @@ pub(super) struct Shortcutter<'a, const W: usize> {
     pub goal_postures: Bits<W>,
     /// Whether the last turn may change: the goal leaves the heading open.
     pub open_end: bool,
+    pub grain: Grain,
 }
 
 impl<const W: usize> CheckedRoute<W> {
@@ -60,13 +61,13 @@ impl<const W: usize> Shortcutter<'_, W> {
 
     fn turn(&self, at: [f64; 2], yaw: f64, turn: f64) -> Option<Vec<Bits<W>>> {
         let mut pieces = Vec::new();
-        spin_pieces(Pose2::new(at[0], at[1], yaw), turn, &mut pieces);
+        spin_pieces(Pose2::new(at[0], at[1], yaw), turn, self.grain, &mut pieces);
         self.masks_of(&pieces)
     }
 
     fn drive(&self, from: [f64; 2], to: [f64; 2], yaw: f64) -> Option<Vec<Bits<W>>> {
         let mut pieces = Vec::new();
-        drive_pieces(Pose2::new(from[0], from[1], yaw), Pose2::new(to[0], to[1], yaw), &mut pieces);
+        drive_pieces(Pose2::new(from[0], from[1], yaw), Pose2::new(to[0], to[1], yaw), self.grain, &mut pieces);
         self.masks_of(&pieces)
     }
 
