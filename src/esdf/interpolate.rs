@@ -3,29 +3,71 @@
 use super::Esdf;
 use crate::mission::Unknown;
 
+/// The cell that holds a point, and where in it; and how far outside the grid the point lies, m.
+struct Place {
+    /// Index of the cell's lower corner.
+    at: usize,
+    /// Within the cell, 0..=1.
+    u: [f64; 3],
+    beyond: [f64; 3],
+}
+
 impl Esdf {
     /// Distance at a point by trilinear interpolation, m: positive outside, negative inside, to the obstacles' surface.
     /// At the nodes exact; between them within sqrt(3)/2 of a cell. Beyond the grid: sideways negative where unknown space
     /// is an obstacle, else (and above and below always) a lower bound of the distance.
+    #[inline]
     pub fn distance(&self, p: [f64; 3]) -> f64 {
-        self.distance_gradient(p).0
+        match self.inside(p) {
+            Some((at, u)) => self.value(at, u),
+            None => self.distance_gradient(p).0,
+        }
     }
 
     /// Distance and its gradient, from the same eight corners. (`MATH` section 4; the gradient jumps at cell faces.)
+    #[inline]
     pub fn distance_gradient(&self, p: [f64; 3]) -> (f64, [f64; 3]) {
+        match self.inside(p) {
+            Some((at, u)) => (self.value(at, u), self.gradient(at, u)),
+            None => self.beyond(p),
+        }
+    }
+
+    /// Lower corner of the cell and place in it, for points in the grid but its upper faces.
+    #[inline]
+    fn inside(&self, p: [f64; 3]) -> Option<(usize, [f64; 3])> {
+        let scale = self.inverse_resolution;
+        let q = [(p[0] - self.origin[0]) * scale, (p[1] - self.origin[1]) * scale, (p[2] - self.origin[2]) * scale];
+        let top = self.last;
+        // NaN fails every comparison and takes the slow way.
+        let inside = q[0] >= 0.0 && q[1] >= 0.0 && q[2] >= 0.0 && q[0] < top[0] && q[1] < top[1] && q[2] < top[2];
+        if !inside {
+            return None;
+        }
+        let cell = [q[0] as usize, q[1] as usize, q[2] as usize];
+        let u = [q[0] - cell[0] as f64, q[1] - cell[1] as f64, q[2] - cell[2] as f64];
+        Some(((cell[0] * self.nodes[1] + cell[1]) * self.nodes[2] + cell[2], u))
+    }
+
+    #[cold]
+    fn place(&self, p: [f64; 3]) -> Place {
         let mut cell = [0usize; 3];
         let mut u = [0.0f64; 3];
         let mut beyond = [0.0f64; 3];
         for a in 0..3 {
-            let last = (self.nodes[a] - 1) as f64;
-            let at = (p[a] - self.origin[a]) / self.resolution;
-            let inside = at.clamp(0.0, last);
+            let at = (p[a] - self.origin[a]) * self.inverse_resolution;
+            let inside = at.clamp(0.0, self.last[a]);
             beyond[a] = (at - inside) * self.resolution;
             // A grid has one cell at least, so there are two nodes along each axis.
             cell[a] = (inside as usize).min(self.nodes[a] - 2);
             u[a] = inside - cell[a] as f64;
         }
-        let (value, mut gradient) = self.interpolate(cell, u);
+        Place { at: (cell[0] * self.nodes[1] + cell[1]) * self.nodes[2] + cell[2], u, beyond }
+    }
+
+    fn beyond(&self, p: [f64; 3]) -> (f64, [f64; 3]) {
+        let Place { at, u, beyond } = self.place(p);
+        let (value, mut gradient) = (self.value(at, u), self.gradient(at, u));
         if beyond == [0.0; 3] {
             return (value, gradient);
         }
@@ -54,29 +96,38 @@ impl Esdf {
         (distance, gradient)
     }
 
+    /// The eight corners of a cell, z fastest.
     #[inline]
-    fn interpolate(&self, cell: [usize; 3], u: [f64; 3]) -> (f64, [f64; 3]) {
+    fn corners(&self, at: usize) -> [f64; 8] {
         let row = self.nodes[2];
         let slab = self.nodes[1] * row;
-        let at = cell[0] * slab + cell[1] * row + cell[2];
-        let v = &self.values;
-        let pair = |i: usize| (f64::from(v[i]), f64::from(v[i + 1]));
-        let (v000, v001) = pair(at);
-        let (v010, v011) = pair(at + row);
-        let (v100, v101) = pair(at + slab);
-        let (v110, v111) = pair(at + slab + row);
-        let [ux, uy, uz] = u;
-        let (z00, z01) = (v000 + uz * (v001 - v000), v010 + uz * (v011 - v010));
-        let (z10, z11) = (v100 + uz * (v101 - v100), v110 + uz * (v111 - v110));
+        let v = &self.values[at..at + slab + row + 2];
+        let [a, b, c, d] = [0, row, slab, slab + row];
+        [v[a], v[a + 1], v[b], v[b + 1], v[c], v[c + 1], v[d], v[d + 1]].map(f64::from)
+    }
+
+    #[inline]
+    fn value(&self, at: usize, [ux, uy, uz]: [f64; 3]) -> f64 {
+        let v = self.corners(at);
+        let (z00, z01) = (v[0] + uz * (v[1] - v[0]), v[2] + uz * (v[3] - v[2]));
+        let (z10, z11) = (v[4] + uz * (v[5] - v[4]), v[6] + uz * (v[7] - v[6]));
         let (y0, y1) = (z00 + uy * (z01 - z00), z10 + uy * (z11 - z10));
-        let value = y0 + ux * (y1 - y0);
-        let scale = 1.0 / self.resolution;
+        y0 + ux * (y1 - y0)
+    }
+
+    #[inline]
+    fn gradient(&self, at: usize, [ux, uy, uz]: [f64; 3]) -> [f64; 3] {
+        let v = self.corners(at);
+        let (z00, z01) = (v[0] + uz * (v[1] - v[0]), v[2] + uz * (v[3] - v[2]));
+        let (z10, z11) = (v[4] + uz * (v[5] - v[4]), v[6] + uz * (v[7] - v[6]));
+        let (y0, y1) = (z00 + uy * (z01 - z00), z10 + uy * (z11 - z10));
+        let scale = self.inverse_resolution;
         let dx = (y1 - y0) * scale;
         let dy = ((1.0 - ux) * (z01 - z00) + ux * (z11 - z10)) * scale;
         let (low_y, high_y) = (1.0 - uy, uy);
-        let dz = ((1.0 - ux) * (low_y * (v001 - v000) + high_y * (v011 - v010))
-            + ux * (low_y * (v101 - v100) + high_y * (v111 - v110)))
+        let dz = ((1.0 - ux) * (low_y * (v[1] - v[0]) + high_y * (v[3] - v[2]))
+            + ux * (low_y * (v[5] - v[4]) + high_y * (v[7] - v[6])))
             * scale;
-        (value, [dx, dy, dz])
+        [dx, dy, dz]
     }
 }

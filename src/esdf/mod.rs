@@ -14,6 +14,9 @@ use crate::mission::Unknown;
 /// `origin + resolution * (i, j, k)`; there are `dims + 1` nodes along each axis of the map.
 pub struct Esdf {
     pub(crate) resolution: f64,
+    inverse_resolution: f64,
+    /// Index of the last node along each axis.
+    last: [f64; 3],
     pub(crate) origin: [f64; 3],
     pub(crate) nodes: [usize; 3],
     /// Whether space beyond the grid in x and y is an obstacle.
@@ -29,7 +32,9 @@ pub const FAR: f32 = 1.0e4;
 pub fn build(map: &VoxelMap) -> Esdf {
     let nodes = map.dims.map(|d| d + 1);
     let values = transform::signed_distance(map, nodes);
-    Esdf { resolution: map.resolution, origin: map.origin, nodes, outside: map.outside, values }
+    let inverse_resolution = 1.0 / map.resolution;
+    let last = map.dims.map(|d| d as f64);
+    Esdf { resolution: map.resolution, inverse_resolution, last, origin: map.origin, nodes, outside: map.outside, values }
 }
 
 impl Esdf {

@@ -44,6 +44,8 @@ struct Placed {
     inner: f64,
     /// Half extents of the shape's own bounding box, m.
     half: [f64; 3],
+    /// Radius of the ball about the centre that holds the shape, m.
+    radius: f64,
     /// Centres (shape frame) and one radius of balls that cover the shape.
     balls: Vec<Vector3<f64>>,
     ball_radius: f64,
@@ -251,6 +253,12 @@ impl<'a, const W: usize> Collider<'a, W> {
         let half_turn = 0.5 * motion.turn();
         let moves = 0.5 * motion.from.distance(motion.to) + placed.reach * half_turn;
         let middle = pose.under(motion.middle());
+        let c = middle.centre;
+        let slack = TOO_HIGH * self.map.resolution + moves;
+        let whole = self.esdf.distance([c.x, c.y, c.z]) - slack - placed.radius;
+        if whole >= self.clearance {
+            return gjk::Gap { lower: whole, upper: f64::INFINITY };
+        }
         let mut lower = f64::INFINITY;
         for ball in &placed.balls {
             let c = middle.centre + middle.rotation * ball;
@@ -260,7 +268,7 @@ impl<'a, const W: usize> Collider<'a, W> {
             if upper < self.clearance {
                 return gjk::Gap { lower: upper.min(0.0), upper };
             }
-            lower = lower.min(distance - TOO_HIGH * self.map.resolution - placed.ball_radius - moves);
+            lower = lower.min(distance - slack - placed.ball_radius);
         }
         if lower >= self.clearance {
             return gjk::Gap { lower, upper: f64::INFINITY };
@@ -420,7 +428,7 @@ impl Placed {
         }
         // A point at distance R shows at least R cos(pi/64) in one of 64 directions.
         reach = reach / (std::f64::consts::PI / 64.0).cos() + step_moves.iter().sum::<f64>() / 2.0;
-        Self { convex: convex.clone(), inner, half, balls, ball_radius, poses, reach, step_moves }
+        Self { convex: convex.clone(), inner, half, radius, balls, ball_radius, poses, reach, step_moves }
     }
 }
 
