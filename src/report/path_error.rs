@@ -1,4 +1,4 @@
-//! How far held commands leave the planned path, against the sampling time ([CONV] section 4).
+//! How far held commands leave the planned path, against the sampling time (\[CONV\] section 4).
 
 use crate::command::{CommandError, CommandTable, SampleOptions, sample, sample_uncorrected};
 use crate::geom::{Pose2, wrap_angle};

@@ -1,4 +1,4 @@
-//! The convolution profile of [CONV] section 2: from rest to rest under speed, acceleration and jerk, in closed form.
+//! The convolution profile of \[CONV\] section 2: from rest to rest under speed, acceleration and jerk, in closed form.
 
 use crate::math::quadrature::gauss_legendre;
 

@@ -131,7 +131,7 @@ fn slowed(leg: TimedLeg, task: Task<'_>) -> TimedLeg {
     TimedLeg { stretch: slow_down(&leg.clock_peaks(true), &binding(task.robot), task.hold), ..leg }
 }
 
-/// [CONV] Eq. 5, applied once: the speed limit less what the wheels differ by under the uncorrected profile.
+/// \[CONV\] Eq. 5, applied once: the speed limit less what the wheels differ by under the uncorrected profile.
 ///
 /// # Errors
 /// Nothing is left.

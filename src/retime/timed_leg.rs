@@ -16,7 +16,7 @@ pub enum Clock {
     Share(Convolution),
     /// Arc length.
     ArcLength(Convolution),
-    /// The curve's parameter as a share of its range, scaled to the curve's length: [CONV] Eq. 2 as printed.
+    /// The curve's parameter as a share of its range, scaled to the curve's length: \[CONV\] Eq. 2 as printed.
     Printed(Convolution),
     /// The curve's parameter: its own seconds.
     Own(Warp),
