@@ -1,6 +1,6 @@
 //! Closes the gap between where held commands end and where the plan ends.
 //!
-//! An arc misses its interval sideways by a third-order term, so the replay's end is off by O(dt^2) ([CONV] section 4). The
+//! An arc misses its interval sideways by a third-order term, so the replay's end is off by O(dt^2) (\[CONV\] section 4). The
 //! correction changes what both wheels travel, row by row, in proportion to the square of the row's speed: a window that vanishes with
 //! its first two differences at every stop. Of all such corrections it is the least in that weight, found by Newton's iteration.
 

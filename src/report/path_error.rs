@@ -1,4 +1,4 @@
-//! How far held commands leave the planned path, against the sampling time ([CONV] section 4).
+//! How far held commands leave the planned path, against the sampling time (\[CONV\] section 4).
 
 use crate::command::{CommandError, CommandTable, SampleOptions, sample, sample_uncorrected};
 use crate::geom::{Pose2, wrap_angle};
@@ -252,7 +252,12 @@ fn distance_to_curve(curve: &PlaneCurve, place: Place, point: [f64; 2]) -> f64 {
         if bend <= 0.0 {
             break;
         }
-        u = (u - slope / bend).clamp(0.0, duration);
+        let step = slope / bend;
+        u = (u - step).clamp(0.0, duration);
+        // What is left changes the distance by the square of the step, over the distance.
+        if step * step * bend <= 1e-9 * best * best {
+            break;
+        }
     }
     best
 }

@@ -43,10 +43,9 @@ pub fn time_leg(course: &Course, law: TimeLaw, task: Task<'_>) -> Result<TimedLe
         TimeLaw::Auto => {
             let mut best: Option<TimedLeg> = None;
             for law in [TimeLaw::Minco, TimeLaw::Eq5, TimeLaw::FixedPoint] {
-                if let Ok(leg) = time_leg(course, law, task) {
-                    if best.as_ref().is_none_or(|best| leg.duration() < best.duration()) {
-                        best = Some(leg);
-                    }
+                let Ok(leg) = time_leg(course, law, task) else { continue };
+                if best.as_ref().is_none_or(|best| leg.duration() < best.duration()) {
+                    best = Some(leg);
                 }
             }
             Ok(best.expect("fixed_point times every curve"))
@@ -132,7 +131,7 @@ fn slowed(leg: TimedLeg, task: Task<'_>) -> TimedLeg {
     TimedLeg { stretch: slow_down(&leg.clock_peaks(true), &binding(task.robot), task.hold), ..leg }
 }
 
-/// [CONV] Eq. 5, applied once: the speed limit less what the wheels differ by under the uncorrected profile.
+/// \[CONV\] Eq. 5, applied once: the speed limit less what the wheels differ by under the uncorrected profile.
 ///
 /// # Errors
 /// Nothing is left.
@@ -156,10 +155,9 @@ fn corrected(
     let wheel_speed = task.robot.wheel.planning()[0];
     let left = v.min(wheel_speed - compensation);
     if left <= LEAST_SPEED * v {
-        let (curvature, _) = largest_bends(curved);
         return Err(RetimeError::CompensationLeavesNoSpeed {
             leg: task.leg,
-            radius: 1.0 / curvature,
+            radius: 1.0 / largest_curvature(curved),
             half_track: curved.half_track,
             left: wheel_speed - compensation,
         });
@@ -167,31 +165,20 @@ fn corrected(
     Ok(convolved(curved, law, clock, [left, a, j], v, task))
 }
 
-/// The centre's cruise at which the faster wheel just keeps its limit where the curve bends most, `v_max / (1 + D/2 max|curvature|)`, and
-/// no joint exceeds its own: the fixed point of Eq. 5 at constant speed, extended to joints.
+/// The centre's cruise at which the faster wheel just keeps its limit where the curve bends most,
+/// `v_max / (1 + D/2 max|curvature|)`: the fixed point of Eq. 5 at constant speed. Joints are left to the slow-down: where they are
+/// fastest per metre the base is often slow anyway.
 fn fixed_point_speed(curved: &Curved, robot: &RobotModel) -> f64 {
-    let (curvature, joints) = largest_bends(curved);
-    let wheels = robot.wheel.planning()[0] / (1.0 + curved.half_track * curvature);
-    let slowest_joint =
-        robot.joints.iter().zip(joints).fold(f64::INFINITY, |slowest, (joint, rate)| match rate > 0.0 {
-            true => slowest.min(joint.limits.planning()[0] / rate),
-            false => slowest,
-        });
-    wheels.min(slowest_joint).min(centre_limits(robot)[0])
+    let wheels = robot.wheel.planning()[0] / (1.0 + curved.half_track * largest_curvature(curved));
+    wheels.min(centre_limits(robot)[0])
 }
 
-/// Largest |curvature| (1/m) and |d(joint)/d(arc length)| of a curve.
-fn largest_bends(curved: &Curved) -> (f64, Vec<f64>) {
+/// Largest |curvature| of a curve, 1/m.
+fn largest_curvature(curved: &Curved) -> f64 {
     let curve = &curved.curve;
     let breaks: Vec<f64> = curve.nodes().map(|node| curve.parameter(node)).collect();
-    let found = peaks(&breaks, true, |u, out| {
-        let place = curve.place(u);
-        let rates = curve.rates(place);
-        out.push([rates.turn[0] / rates.speed[0], 0.0, 0.0]);
-        let dimensions = curve.poly().pieces[0].coefficients.len();
-        out.extend((2..dimensions).map(|d| [curve.jet(d, place)[1] / rates.speed[0], 0.0, 0.0]));
-    });
-    (found.rates[0][0], found.rates[1..].iter().map(|r| r[0]).collect())
+    let found = peaks(&breaks, true, |u, out| out.push([curve.curvature(curve.place(u))[0], 0.0, 0.0]));
+    found.rates[0][0]
 }
 
 /// The optimiser's own timing, with the pair of ramps by which the leg ends soonest after its slow-down.

@@ -8,14 +8,17 @@ const BESIDE: f64 = 1e-9;
 const WORTH_REFINING: f64 = 0.9;
 /// An acceleration that jumps by less than this share of its peak is rounding, not a jump.
 const JUMP: f64 = 1e-6;
+/// Share of a jump that falls between two consecutive differences of interval means, at worst: where it lies in an interval's middle.
+const HELD_JUMP: f64 = 0.75;
 
 /// Peaks over time, one entry an actuator.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Peaks {
     /// Largest |speed|, |acceleration|, |jerk|.
     pub rates: Vec<[f64; 3]>,
-    /// Largest jump of the acceleration at a break: a jerk impulse, where the path's curvature has a kink.
-    pub jumps: Vec<f64>,
+    /// Jumps of the acceleration at breaks, a jerk impulse each, where the path's curvature has a kink: the jump and the largest
+    /// |jerk| beside it.
+    pub jumps: Vec<Vec<[f64; 2]>>,
 }
 
 /// Finds the peaks of `rates`, which appends each actuator's (speed, acceleration, jerk) at a time; it is smooth between `breaks`
@@ -38,7 +41,7 @@ pub fn peaks(breaks: &[f64], refine: bool, mut rates: impl FnMut(f64, &mut Vec<[
         }
         actuators = values.len() / times.len();
     }
-    let mut found = Peaks { rates: vec![[0.0; 3]; actuators], jumps: vec![0.0; actuators] };
+    let mut found = Peaks { rates: vec![[0.0; 3]; actuators], jumps: vec![Vec::new(); actuators] };
     for (i, value) in values.iter().enumerate() {
         let peak = &mut found.rates[i % actuators];
         (0..3).for_each(|k| peak[k] = peak[k].max(value[k].abs()));
@@ -46,10 +49,11 @@ pub fn peaks(breaks: &[f64], refine: bool, mut rates: impl FnMut(f64, &mut Vec<[
     let per_stretch = SAMPLES + 2;
     for join in 1..stretches {
         for actuator in 0..actuators {
-            let at = |sample: usize| values[sample * actuators + actuator][1];
-            let jump = (at(join * per_stretch) - at(join * per_stretch - 1)).abs();
+            let at = |sample: usize| values[sample * actuators + actuator];
+            let (before, after) = (at(join * per_stretch - 1), at(join * per_stretch));
+            let jump = (after[1] - before[1]).abs();
             if jump > JUMP * found.rates[actuator][1] {
-                found.jumps[actuator] = found.jumps[actuator].max(jump);
+                found.jumps[actuator].push([jump, before[2].abs().max(after[2].abs())]);
             }
         }
     }
@@ -112,31 +116,37 @@ fn maximum(bracket: [f64; 3], middle: f64, mut f: impl FnMut(f64) -> f64) -> f64
 /// The least factor `>= 1` by which time must be stretched for every limit (speed, acceleration, jerk; `None`: not checked) to hold.
 ///
 /// Speeds fall with the factor, accelerations with its square, jerks with its cube. A jump of acceleration counts as a jerk of
-/// jump/`hold`, which is what held commands make of it; it falls with the square.
+/// 3/4 jump/`hold`, which is the most that held means make of it; it falls with the square.
 pub fn slow_down(peaks: &Peaks, limits: &[[Option<f64>; 3]], hold: f64) -> f64 {
     let mut factor = 1.0f64;
-    for ((rates, jump), limit) in peaks.rates.iter().zip(&peaks.jumps).zip(limits) {
+    for ((rates, jumps), limit) in peaks.rates.iter().zip(&peaks.jumps).zip(limits) {
         let over = |k: usize| limit[k].map_or(0.0, |limit| rates[k] / limit);
         factor = factor.max(over(0)).max(over(1).sqrt()).max(over(2).cbrt());
-        if let (true, Some(jerk)) = (*jump > 0.0, limit[2]) {
-            let excess = |f: f64| rates[2] / f.powi(3) + jump / (hold * f * f) - jerk;
-            let (mut low, mut high) = (factor, factor);
-            while excess(high) > 0.0 {
-                low = high;
-                high *= 2.0;
-            }
-            for _ in 0..50 {
-                let middle = 0.5 * (low + high);
-                if excess(middle) > 0.0 {
-                    low = middle;
-                } else {
-                    high = middle;
-                }
-            }
-            factor = high;
+        let Some(limit) = limit[2] else { continue };
+        for [jump, jerk] in jumps {
+            factor = jump_slow_down(factor, HELD_JUMP * jump / hold, *jerk, limit);
         }
     }
     factor
+}
+
+/// The least factor, not below `factor`, with jerk/factor^3 + impulse/factor^2 <= limit.
+fn jump_slow_down(factor: f64, impulse: f64, jerk: f64, limit: f64) -> f64 {
+    let excess = |f: f64| jerk / (f * f * f) + impulse / (f * f) - limit;
+    let (mut low, mut high) = (factor, factor);
+    while excess(high) > 0.0 {
+        low = high;
+        high *= 2.0;
+    }
+    for _ in 0..50 {
+        let middle = 0.5 * (low + high);
+        if excess(middle) > 0.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
 }
 
 #[cfg(test)]
@@ -154,25 +164,28 @@ mod tests {
         assert!((found.rates[0][1] - 0.3962).abs() < 1e-8, "{found:?}");
         assert!((found.rates[0][2] - (-0.3f64).exp()).abs() < 1e-8);
         assert_eq!(found.rates[1], [0.0; 3]);
-        assert_eq!(found.jumps, [0.0, 0.0]);
+        assert!(found.jumps.iter().all(Vec::is_empty));
     }
 
     #[test]
     fn a_jump_of_acceleration_is_found_at_a_break() {
         let found = peaks(&[0.0, 1.0, 2.0], true, |t, out| out.push([0.0, if t < 1.0 { 0.2 } else { -0.1 }, 0.0]));
-        assert!((found.jumps[0] - 0.3).abs() < 1e-12);
+        assert!((found.jumps[0][0][0] - 0.3).abs() < 1e-12);
     }
 
     #[test]
     fn the_slow_down_restores_each_limit_exactly() {
-        let of = |rates: [f64; 3], jump: f64| Peaks { rates: vec![rates], jumps: vec![jump] };
+        let of = |rates: [f64; 3], jump: f64| Peaks {
+            rates: vec![rates],
+            jumps: vec![if jump > 0.0 { vec![[jump, 0.1]] } else { vec![] }],
+        };
         let limits = [[Some(0.5), Some(0.2), Some(0.2)]];
         assert_eq!(slow_down(&of([0.5, 0.1, 0.2], 0.0), &limits, 0.1), 1.0);
         assert_eq!(slow_down(&of([1.0, 0.2, 0.2], 0.0), &limits, 0.1), 2.0);
         assert!((slow_down(&of([0.5, 0.8, 0.2], 0.0), &limits, 0.1) - 2.0).abs() < 1e-15);
         assert!((slow_down(&of([0.5, 0.2, 1.6], 0.0), &limits, 0.1) - 2.0).abs() < 1e-15);
         assert_eq!(slow_down(&of([9.0, 9.0, 9.0], 0.0), &[[None; 3]], 0.1), 1.0);
-        let jumping = slow_down(&of([0.0, 0.0, 0.1], 0.08), &limits, 0.1);
-        assert!((0.1 / jumping.powi(3) + 0.8 / jumping.powi(2) - 0.2).abs() < 1e-12);
+        let jumping = slow_down(&of([0.0, 0.0, 0.15], 0.08), &limits, 0.1);
+        assert!((0.1 / jumping.powi(3) + 0.6 / jumping.powi(2) - 0.2).abs() < 1e-12);
     }
 }

@@ -32,6 +32,13 @@ pub struct MotionState {
     pub joints: Vec<Jet>,
 }
 
+/// A time by the leg that it falls into, with wheel travel since *its* start: differences of small numbers lose least.
+struct Local {
+    leg: usize,
+    since: f64,
+    positions: Vec<f64>,
+}
+
 impl MotionProfile {
     /// Joins timed legs; the duration is rounded up to a multiple of `hold`, at least one.
     pub(super) fn new(legs: Vec<TimedLeg>, law: TimeLaw, hold: f64) -> Self {
@@ -164,28 +171,36 @@ impl MotionProfile {
         (1..=steps)
             .map(|k| {
                 let after = self.local_positions(k as f64 * hold);
-                let mean = (0..before.1.len()).map(|i| self.moved(i, &before, &after) / hold).collect();
+                let mut means = Vec::with_capacity(after.positions.len());
+                let mut length = hold;
+                if before.leg == after.leg && self.legs[after.leg].moved(before.since, after.since, &mut means) {
+                    // Of the interval as it came out after rounding: a last-bit error of its length would be a step in speed.
+                    length = (after.since - before.since) * self.stretch();
+                } else {
+                    means.clear();
+                    means.extend((0..after.positions.len()).map(|i| self.difference(i, &before, &after)));
+                }
+                means.iter_mut().for_each(|mean| *mean /= length);
                 before = after;
-                mean
+                means
             })
             .collect()
     }
 
-    /// The leg at a time, with wheel travel since *its* start: differences of small numbers lose least.
-    fn local_positions(&self, t: f64) -> (usize, Vec<f64>) {
+    fn local_positions(&self, t: f64) -> Local {
         let (leg, since) = self.leg_at(t);
-        let mut out = Vec::with_capacity(2 + self.joint_count());
-        self.legs[leg].positions(since, &mut out);
-        (leg, out)
+        let mut positions = Vec::with_capacity(2 + self.joint_count());
+        self.legs[leg].positions(since, &mut positions);
+        Local { leg, since, positions }
     }
 
-    fn moved(&self, i: usize, before: &(usize, Vec<f64>), after: &(usize, Vec<f64>)) -> f64 {
-        let within = after.1[i] - before.1[i];
+    fn difference(&self, i: usize, before: &Local, after: &Local) -> f64 {
+        let within = after.positions[i] - before.positions[i];
         // Joint values are absolute; wheel travel starts anew with every leg.
-        if i >= 2 || before.0 == after.0 {
+        if i >= 2 || before.leg == after.leg {
             within
         } else {
-            within + (self.travel[after.0][i] - self.travel[before.0][i])
+            within + (self.travel[after.leg][i] - self.travel[before.leg][i])
         }
     }
 

@@ -4,7 +4,7 @@ use crate::math::poly::{Piece, PiecewisePoly};
 use crate::trajectory::{DriveLeg, StillLeg, fixtures, given};
 
 const LAWS: [TimeLaw; 4] = [TimeLaw::Auto, TimeLaw::Minco, TimeLaw::Eq5, TimeLaw::FixedPoint];
-/// The arbitrary path of [CONV], its second half alone.
+/// The arbitrary path of \[CONV\], its second half alone.
 const BEND: [[f64; 2]; 4] = [[1.0, 1.0], [1.64, 1.0], [2.4, 0.4], [3.0, 1.0]];
 
 fn options(law: TimeLaw) -> RetimeOptions {

@@ -16,7 +16,7 @@ pub enum Clock {
     Share(Convolution),
     /// Arc length.
     ArcLength(Convolution),
-    /// The curve's parameter as a share of its range, scaled to the curve's length: [CONV] Eq. 2 as printed.
+    /// The curve's parameter as a share of its range, scaled to the curve's length: \[CONV\] Eq. 2 as printed.
     Printed(Convolution),
     /// The curve's parameter: its own seconds.
     Own(Warp),
@@ -64,7 +64,6 @@ impl TimedLeg {
         match self.locate(t / self.stretch) {
             At::Share(p, [share, ..]) => {
                 out.extend(p.wheel_changes().map(|change| share * change));
-                // Exact at both ends: the goal's joint values are the goal's.
                 let joints = p.joints.iter().zip(&p.joint_changes);
                 out.extend(joints.map(|(from, change)| from + share * change));
             }
@@ -75,6 +74,18 @@ impl TimedLeg {
                 out.extend((2..dimensions).map(|d| curved.curve.poly().pieces[place.piece].derivative(d, 0, place.u)));
             }
         }
+    }
+
+    /// What (left, right, joints…) move between two times since the leg's start, where that is known better than by a difference of
+    /// positions: on proportional courses. Appended to `out`; returns whether it is.
+    pub fn moved(&self, from: f64, to: f64, out: &mut Vec<f64>) -> bool {
+        let (Course::Proportional(p), Clock::Share(profile)) = (&self.course, &self.clock) else { return false };
+        if profile.distance() <= 0.0 {
+            return false;
+        }
+        let share = profile.between(from / self.stretch, to / self.stretch) / profile.distance();
+        out.extend(p.wheel_changes().iter().chain(&p.joint_changes).map(|change| share * change));
+        true
     }
 
     /// Speed, acceleration and jerk of (left, right, joints…, centre) at a time since the leg's start, appended to `out`.

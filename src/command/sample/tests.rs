@@ -137,17 +137,32 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(48) })]
     #[test]
     fn limits_and_end_point_hold_on_random_curves(
-        points in prop::array::uniform8(-2.0..2.0f64), hold in 0.02..0.5f64, instant in any::<bool>(), quick in any::<bool>(),
+        points in prop::array::uniform14(-2.0..2.0f64), corner in any::<bool>(), hold in 0.02..0.5f64, instant in any::<bool>(), quick in any::<bool>(),
         blade in 0.0..3.0f64,
     ) {
         let p = |i: usize| [points[2 * i], points[2 * i + 1]];
         let robot = if quick { fast() } else { fixtures::scr_db() };
         let joints = if quick { vec![] } else { vec![blade] };
-        if let Ok(trajectory) = given::from_bezier(&[[p(0), p(1), p(2), p(3)]], &joints) {
+        let segments = [[p(0), p(1), p(2), p(3)], [p(3), p(4), p(5), p(6)]];
+        if let Ok(trajectory) = given::from_bezier(&segments[..if corner { 2 } else { 1 }], &joints) {
             let sampling = if instant { Sampling::Instant } else { Sampling::Mean };
             let profile = retime(&trajectory, &robot, &RetimeOptions { law: TimeLaw::Auto, sampling_time: hold }).unwrap();
-            let table = sample(&profile, &robot, &options(hold, sampling)).unwrap();
-            check(&table, &profile, &robot);
+            // A near-cusp (radius of micrometres) makes one uniform slow-down take days: no table to look at.
+            if profile.time() < 2000.0 {
+                let table = sample(&profile, &robot, &options(hold, sampling)).unwrap();
+                check(&table, &profile, &robot);
+            }
         }
+    }
+}
+
+#[test]
+fn short_holds_are_not_slowed_down_by_rounding() {
+    let line = given::from_bezier(&[[[0.0, 0.0], [4.0 / 3.0, 0.0], [8.0 / 3.0, 0.0], [4.0, 0.0]]], &[]).unwrap();
+    let robot = fixtures::conv();
+    for hold in [0.01, 0.02, 0.05] {
+        let (profile, table) = compile(&line, &robot, TimeLaw::Auto, options(hold, Sampling::Mean));
+        check(&table, &profile, &robot);
+        assert!((table.duration() - 11.5).abs() < 1e-9, "{hold}: {}", table.duration());
     }
 }

@@ -3,7 +3,7 @@ use crate::mission::TimeLaw;
 use crate::retime::{RetimeOptions, retime};
 use crate::trajectory::{fixtures, given};
 
-/// The C-curve of [CONV] section 3.
+/// The C-curve of \[CONV\] section 3.
 const C_CURVE: [[f64; 2]; 4] = [[0.0, 0.0], [3.0, 0.0], [4.0, 1.0], [4.0, 4.0]];
 const S_CURVE: [[f64; 2]; 4] = [[0.0, 0.0], [3.0, 0.0], [1.0, 4.0], [4.0, 4.0]];
 

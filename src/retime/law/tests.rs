@@ -46,7 +46,7 @@ fn every_law_agrees_with_an_independent_solver_on_the_papers_paths() {
         let (trajectory, task) = (path(name), task(&robot, false));
         let curved = course(&trajectory);
         assert!((curved.curve.length() - row["length"].as_f64().unwrap()).abs() < 6e-7);
-        assert!((largest_bends(&curved).0 - row["max_curvature"].as_f64().unwrap()).abs() < 6e-7);
+        assert!((largest_curvature(&curved) - row["max_curvature"].as_f64().unwrap()).abs() < 6e-7);
         let centre_only = convolved(&curved, TimeLaw::Eq5, Clock::ArcLength, [0.5, 0.2, 0.2], 0.5, task);
         agree(&centre_only, &row["centre_only"]);
         let law = |law| time_leg(&Course::Curved(curved.clone()), law, task).unwrap();
