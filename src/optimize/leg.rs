@@ -19,6 +19,8 @@ use crate::trajectory::{DriveLeg, Ending};
 const JUDGE_DENSITY: usize = 4;
 /// A limit overstepped by this share makes the whole motion crawl once it is slowed down to keep it.
 const HOPELESS: f64 = 0.5;
+/// The heading at a leg's end is fixed by its end state; a difference is whole turns.
+const HEADING_TOLERANCE: f64 = 0.05;
 
 /// What all legs of one robot share.
 pub(crate) struct Context<'a, F> {
@@ -54,6 +56,7 @@ pub(crate) struct SolvedLeg {
     pub ending: Ending,
     /// Keeps its heading's branch, its clearance within the tolerance, and roughly its limits.
     pub sound: bool,
+    #[cfg_attr(not(test), expect(dead_code, reason = "`sound` says what callers need; tests judge the figures"))]
     pub violation: Violation,
 }
 
@@ -69,7 +72,7 @@ pub(crate) fn solve<F: DistanceField>(
     let clearance = context.clearance.clone();
     let mut objective = Objective::new(context.robot, context.field, minco, section.reverse, clearance, options);
     let mut iteration = Lbfgs::new(objective.dimension(), options.lbfgs.clone());
-    let mut x = first.variables;
+    let mut x = first.variables.clone();
     let judged_at = options.samples_per_piece.max(1) * JUDGE_DENSITY;
     let (mut iterations, mut cost, mut ending) = (0, f64::NAN, Ending::Converged);
     let mut violation = Violation { motion: f64::INFINITY, clearance: f64::INFINITY };
@@ -99,19 +102,28 @@ pub(crate) fn solve<F: DistanceField>(
         }
         if near {
             objective.weights.clearance *= options.weight_growth;
+            objective.tighten(violation.clearance.min(options.clearance_tolerance));
         }
     }
-    let checked = objective.violation(&x, judged_at);
-    if violation.motion.is_finite() {
-        violation = checked;
-    }
-    let curve = real_time(objective.curve());
     let (from, to) = (path.states[section.first].pose.yaw, path.states[section.last].pose.yaw);
-    let leg = DriveLeg { curve, reverse: section.reverse, yaw_start: from };
-    let slack = options.clearance_tolerance;
-    let sound = violation.motion < HOPELESS
-        && violation.clearance < slack
-        && heading_at_end(&leg, judged_at).is_some_and(|yaw| (yaw - to).abs() < 0.05);
+    let leg_of = |curve: &Minco| DriveLeg { curve: real_time(curve), reverse: section.reverse, yaw_start: from };
+    let keeps_heading =
+        |leg: &DriveLeg| heading_at_end(leg, judged_at).is_some_and(|yaw| (yaw - to).abs() < HEADING_TOLERANCE);
+    let judged = objective.violation(&x, judged_at);
+    let mut leg = leg_of(objective.curve());
+    let mut sound = violation.motion < HOPELESS && violation.clearance < options.clearance_tolerance;
+    if ending == Ending::LineSearchStalled && !violation.motion.is_finite() {
+        sound = false;
+    } else {
+        violation = judged;
+    }
+    if !keeps_heading(&leg) {
+        // A loop or a cusp: the legs that follow would be turned round. On a straight the first guess has neither.
+        sound = false;
+        ending = Ending::LineSearchStalled;
+        objective.violation(&first.variables, 1);
+        leg = leg_of(objective.curve());
+    }
     SolvedLeg { pieces: leg.curve.pieces.len(), leg, iterations, cost, ending, sound, violation }
 }
 
@@ -123,7 +135,8 @@ pub(crate) fn heading_at_end(leg: &DriveLeg, per_piece: usize) -> Option<f64> {
         for k in 0..=per_piece {
             let t = piece.duration * k as f64 / per_piece as f64;
             let next = unwrap_near((side * piece.derivative(1, 1, t)).atan2(side * piece.derivative(0, 1, t)), yaw);
-            if !((next - yaw).abs() < 0.8) {
+            let turn = (next - yaw).abs();
+            if turn.is_nan() || turn > 0.8 {
                 return None;
             }
             yaw = next;

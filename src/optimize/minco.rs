@@ -96,7 +96,7 @@ impl Minco {
     /// A curve of `pieces >= 1` between two end states, `[order * m + dimension]`, orders 0 to 3. No shape until
     /// [`Self::shape`].
     pub fn new(pieces: usize, start: &[f64], end: &[f64]) -> Self {
-        debug_assert!(pieces >= 1 && start.len() == end.len() && start.len() % ORDERS == 0);
+        debug_assert!(pieces >= 1 && start.len() == end.len() && start.len().is_multiple_of(ORDERS));
         let dimensions = start.len() / ORDERS;
         let mut states = vec![0.0; (pieces + 1) * ORDERS * dimensions];
         states[..start.len()].copy_from_slice(start);
@@ -319,7 +319,7 @@ impl Minco {
     /// the energy's bilinear form of the curve and of the curve with Hermite data lambda.
     fn subtract_adjoint(&mut self, by_durations: &mut [f64]) {
         let m = self.dimensions;
-        for piece in 0..self.pieces {
+        for (piece, by_duration) in by_durations.iter_mut().enumerate() {
             let t = self.durations[piece];
             let unit = [t, t * t, t * t * t];
             let scale = 1.0 / t.powi(7);
@@ -340,7 +340,7 @@ impl Minco {
                     form += own;
                     stretch += (k + 1) as f64 * (own + from[k] * forces[k + 1] + to[k] * forces[k + 5]);
                 }
-                by_durations[piece] -= scale / t * (stretch - 7.0 * form);
+                *by_duration -= scale / t * (stretch - 7.0 * form);
                 self.state_gradient[node + d] -= scale * back[0];
                 self.state_gradient[node + ORDERS * m + d] -= scale * back[4];
                 for k in 0..3 {
