@@ -8,6 +8,7 @@ use super::options::OptimizeOptions;
 use super::penalty::Limits;
 use super::penalty::clearance::{ClearancePenalty, DistanceField};
 use super::sections::DriveSection;
+use super::time_map;
 use crate::geom::unwrap_near;
 use crate::math::lbfgs::{Lbfgs, Stop};
 use crate::math::poly::{Piece, PiecewisePoly};
@@ -19,6 +20,8 @@ use crate::trajectory::{DriveLeg, Ending};
 const JUDGE_DENSITY: usize = 4;
 /// A limit overstepped by this share makes the whole motion crawl once it is slowed down to keep it.
 const HOPELESS: f64 = 0.5;
+/// A curve that takes this many times the first guess's time (and 2 s for its ramps) is caught in a loop.
+const DETOUR: f64 = 1.4;
 /// The heading at a leg's end is fixed by its end state; a difference is whole turns.
 const HEADING_TOLERANCE: f64 = 0.05;
 
@@ -73,6 +76,7 @@ pub(crate) fn solve<F: DistanceField>(
     let mut objective = Objective::new(context.robot, context.field, minco, section.reverse, clearance, options);
     let mut iteration = Lbfgs::new(objective.dimension(), options.lbfgs.clone());
     let mut x = first.variables.clone();
+    let guessed: f64 = x[x.len() - first.pieces..].iter().map(|tau| time_map::duration(*tau).0).sum();
     let judged_at = options.samples_per_piece.max(1) * JUDGE_DENSITY;
     let (mut iterations, mut cost, mut ending) = (0, f64::NAN, Ending::Converged);
     let mut violation = Violation { motion: f64::INFINITY, clearance: f64::INFINITY };
@@ -112,6 +116,8 @@ pub(crate) fn solve<F: DistanceField>(
     let judged = objective.violation(&x, judged_at);
     let mut leg = leg_of(objective.curve());
     let mut sound = violation.motion < HOPELESS && violation.clearance < options.clearance_tolerance;
+    // A loop that turns nothing round still keeps every limit: it only takes long.
+    sound &= leg.curve.duration() < DETOUR * guessed + 2.0;
     if ending == Ending::LineSearchStalled && !violation.motion.is_finite() {
         sound = false;
     } else {
