@@ -31,7 +31,8 @@ pub(crate) struct Context<'a, F> {
     pub field: &'a F,
     pub limits: Limits,
     pub clearance: ClearancePenalty,
-    pub options: &'a OptimizeOptions,
+    /// The options, and those of a second attempt: stiffer against what lets a curve slip into a loop.
+    pub attempts: [OptimizeOptions; 2],
 }
 
 impl<'a, F: DistanceField> Context<'a, F> {
@@ -45,8 +46,17 @@ impl<'a, F: DistanceField> Context<'a, F> {
             field,
             limits: Limits::new(robot, options.penalty_width),
             clearance: ClearancePenalty::new(contour, robot.bodies.len(), options.clearance, scale, field.cell()),
-            options,
+            attempts: [options.clone(), stiffer(options)],
         }
+    }
+}
+
+/// A first pass that pays five times as much for the limits and looks between samples up to half the speed limit.
+fn stiffer(options: &OptimizeOptions) -> OptimizeOptions {
+    OptimizeOptions {
+        motion_weight: 5.0 * options.motion_weight,
+        dense_below: options.dense_below.max(0.5),
+        ..options.clone()
     }
 }
 
@@ -59,17 +69,32 @@ pub(crate) struct SolvedLeg {
     pub ending: Ending,
     /// Keeps its heading's branch, its clearance within the tolerance, and roughly its limits.
     pub sound: bool,
-    #[cfg_attr(not(test), expect(dead_code, reason = "`sound` says what callers need; tests judge the figures"))]
     pub violation: Violation,
 }
 
-/// Optimises one section.
+/// Optimises one section; where the first attempt is not sound, a second one may be.
 pub(crate) fn solve<F: DistanceField>(
     path: &SearchPath,
     section: &DriveSection,
     context: &Context<'_, F>,
 ) -> SolvedLeg {
-    let options = context.options;
+    let [first, second] = &context.attempts;
+    let solved = attempt(path, section, context, first);
+    if solved.sound {
+        return solved;
+    }
+    let again = attempt(path, section, context, second);
+    let iterations = solved.iterations + again.iterations;
+    let better = if again.sound || again.violation.clearance < solved.violation.clearance { again } else { solved };
+    SolvedLeg { iterations, ..better }
+}
+
+fn attempt<F: DistanceField>(
+    path: &SearchPath,
+    section: &DriveSection,
+    context: &Context<'_, F>,
+    options: &OptimizeOptions,
+) -> SolvedLeg {
     let first = guess(path, section, &context.limits, options);
     let minco = Minco::new(first.pieces, &first.start, &first.end);
     let clearance = context.clearance.clone();

@@ -17,7 +17,7 @@ pub struct OptimizeOptions {
     pub samples_per_piece: usize,
     /// kappa': dense samples a sparse interval; made even. Default 4.
     pub dense_samples: usize,
-    /// v_la as a share of the speed limit: dense sampling below it. Default 0.5.
+    /// v_la as a share of the speed limit: dense sampling below it. Default 0.35.
     pub dense_below: f64,
     /// Distance between contour points on edges, m. `None`: the cell of the distance field, within 3 and 8 cm.
     pub contour_spacing: Option<f64>,
@@ -60,7 +60,7 @@ impl Default for OptimizeOptions {
             dense: true,
             samples_per_piece: 12,
             dense_samples: 4,
-            dense_below: 0.5,
+            dense_below: 0.35,
             contour_spacing: None,
             smoothness: 0.03,
             penalty_width: 0.1,
