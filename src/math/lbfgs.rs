@@ -229,9 +229,9 @@ impl Lbfgs {
     fn remember(&mut self, slot: usize, x: &[f64]) -> bool {
         let n = self.dimension;
         let (mut curvature, mut step_square, mut change_square) = (0.0, 0.0, 0.0);
-        for i in 0..n {
-            let s = self.trial[i] - x[i];
-            let y = self.trial_gradient[i] - self.gradient[i];
+        let gradients = self.trial_gradient.iter().zip(&self.gradient);
+        for ((to, from), (after, before)) in self.trial.iter().zip(x).zip(gradients) {
+            let (s, y) = (to - from, after - before);
             curvature += s * y;
             step_square += s * s;
             change_square += y * y;
@@ -239,9 +239,12 @@ impl Lbfgs {
         if curvature <= 1e-12 * (step_square * change_square).sqrt() {
             return false;
         }
-        for i in 0..n {
-            self.steps[slot * n + i] = self.trial[i] - x[i];
-            self.changes[slot * n + i] = self.trial_gradient[i] - self.gradient[i];
+        for (step, (to, from)) in self.steps[slot * n..].iter_mut().zip(self.trial.iter().zip(x)) {
+            *step = to - from;
+        }
+        let gradients = self.trial_gradient.iter().zip(&self.gradient);
+        for (change, (after, before)) in self.changes[slot * n..].iter_mut().zip(gradients) {
+            *change = after - before;
         }
         self.curvatures[slot] = curvature;
         true

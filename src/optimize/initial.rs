@@ -14,6 +14,8 @@ const SHARP: f64 = 0.6;
 const USED: f64 = 0.7;
 /// A joint jump while standing is spread over this on either side, m.
 const JOINT_SPREAD: f64 = 0.2;
+/// Arcs shorter than this get no waypoint of their own, m.
+const SHORTEST_ARC: f64 = 0.06;
 /// A piece moves no joint further than this share of the way it can go in a second.
 const JOINT_STEP: f64 = 0.8;
 
@@ -45,7 +47,7 @@ impl Line<'_> {
         self.arc.last().copied().unwrap_or(0.0)
     }
 
-    /// Calls `blend(state before, state after, share of the second)` for the place at arc length `s`.
+    /// The state before the place at arc length `s`, and the share of the one after.
     fn locate(&self, s: f64) -> (usize, f64) {
         let last = self.arc.len() - 1;
         let upper = self.arc.partition_point(|a| *a <= s).clamp(1, last);
@@ -58,6 +60,17 @@ impl Line<'_> {
         let (i, f) = self.locate(s);
         let (a, b) = (self.path.states[i].pose, self.path.states[i + 1].pose);
         [a.x + f * (b.x - a.x), a.y + f * (b.y - a.y)]
+    }
+
+    /// Where an arc of length `arc` that turns by `angle` ends that begins at the start; or begins that ends at the end.
+    fn turned(&self, at_end: bool, arc: f64, angle: f64) -> [f64; 2] {
+        let side = if self.section.reverse { -1.0 } else { 1.0 };
+        let pose = if at_end {
+            self.path.states[self.section.last].pose.after_twist(-side * arc, -angle, 1.0)
+        } else {
+            self.path.states[self.section.first].pose.after_twist(side * arc, angle, 1.0)
+        };
+        [pose.x, pose.y]
     }
 
     fn joint(&self, s: f64, j: usize) -> f64 {
@@ -153,6 +166,15 @@ fn bends(line: &Line<'_>, options: &OptimizeOptions) -> Vec<Bend> {
     bends
 }
 
+/// Length of the arc over which a leg turns out of its start, or into its end: at a tenth of the speed limit, where nearly all
+/// of the turn rate is left. Without it a robot that turns slowly would change direction, in the first guess, while all but
+/// standing. `None` where it turns quickly: a piece so short would only be stiff.
+fn turning_length(angle: f64, reach: f64, limits: &Limits) -> Option<f64> {
+    let v = (0.1 * limits.speed).max(limits.min_speed);
+    let arc = (v * angle / (USED * limits.turn_rate(v)).max(1e-3)).min(0.75 * reach);
+    (arc > SHORTEST_ARC).then_some(arc)
+}
+
 fn breaks(line: &Line<'_>, limits: &Limits, options: &OptimizeOptions) -> Vec<Break> {
     let bends = bends(line, options);
     let length = line.length();
@@ -169,9 +191,17 @@ fn breaks(line: &Line<'_>, limits: &Limits, options: &OptimizeOptions) -> Vec<Br
         let angle = bend.angle.abs();
         if bend.reach > 0.0 && i == 0 {
             breaks[0].turn = angle;
-            breaks.push(on_line(bend.reach, 0.0));
+            let arc = turning_length(angle, bend.reach, limits);
+            breaks.push(match arc {
+                Some(arc) => Break { at: arc, position: line.turned(false, arc, bend.angle), turn: 0.0 },
+                None => on_line(bend.reach, 0.0),
+            });
         } else if bend.reach > 0.0 && i + 1 == bends.len() {
-            breaks.push(on_line(to, angle));
+            let arc = turning_length(angle, bend.reach, limits);
+            breaks.push(match arc {
+                Some(arc) => Break { at: length - arc, position: line.turned(true, arc, bend.angle), turn: angle },
+                None => on_line(to, angle),
+            });
         } else if bend.reach > 0.0 {
             let (a, b, c) = (line.position(to), line.position(bend.at), line.position(bend.at + bend.reach));
             if angle > SHARP {

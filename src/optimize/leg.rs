@@ -8,6 +8,7 @@ use super::options::OptimizeOptions;
 use super::penalty::Limits;
 use super::penalty::clearance::{ClearancePenalty, DistanceField};
 use super::sections::DriveSection;
+use super::time_map;
 use crate::geom::unwrap_near;
 use crate::math::lbfgs::{Lbfgs, Stop};
 use crate::math::poly::{Piece, PiecewisePoly};
@@ -19,6 +20,10 @@ use crate::trajectory::{DriveLeg, Ending};
 const JUDGE_DENSITY: usize = 4;
 /// A limit overstepped by this share makes the whole motion crawl once it is slowed down to keep it.
 const HOPELESS: f64 = 0.5;
+/// A curve that takes this many times the first guess's time (and 2 s for its ramps) is caught in a loop.
+const DETOUR: f64 = 1.4;
+/// The heading at a leg's end is fixed by its end state; a difference is whole turns.
+const HEADING_TOLERANCE: f64 = 0.05;
 
 /// What all legs of one robot share.
 pub(crate) struct Context<'a, F> {
@@ -26,7 +31,8 @@ pub(crate) struct Context<'a, F> {
     pub field: &'a F,
     pub limits: Limits,
     pub clearance: ClearancePenalty,
-    pub options: &'a OptimizeOptions,
+    /// The options, and those of a second attempt: stiffer against what lets a curve slip into a loop.
+    pub attempts: [OptimizeOptions; 2],
 }
 
 impl<'a, F: DistanceField> Context<'a, F> {
@@ -40,8 +46,17 @@ impl<'a, F: DistanceField> Context<'a, F> {
             field,
             limits: Limits::new(robot, options.penalty_width),
             clearance: ClearancePenalty::new(contour, robot.bodies.len(), options.clearance, scale, field.cell()),
-            options,
+            attempts: [options.clone(), stiffer(options)],
         }
+    }
+}
+
+/// A first pass that pays five times as much for the limits and looks between samples up to half the speed limit.
+fn stiffer(options: &OptimizeOptions) -> OptimizeOptions {
+    OptimizeOptions {
+        motion_weight: 5.0 * options.motion_weight,
+        dense_below: options.dense_below.max(0.5),
+        ..options.clone()
     }
 }
 
@@ -57,19 +72,36 @@ pub(crate) struct SolvedLeg {
     pub violation: Violation,
 }
 
-/// Optimises one section.
+/// Optimises one section; where the first attempt is not sound, a second one may be.
 pub(crate) fn solve<F: DistanceField>(
     path: &SearchPath,
     section: &DriveSection,
     context: &Context<'_, F>,
 ) -> SolvedLeg {
-    let options = context.options;
+    let [first, second] = &context.attempts;
+    let solved = attempt(path, section, context, first);
+    if solved.sound {
+        return solved;
+    }
+    let again = attempt(path, section, context, second);
+    let iterations = solved.iterations + again.iterations;
+    let better = if again.sound || again.violation.clearance < solved.violation.clearance { again } else { solved };
+    SolvedLeg { iterations, ..better }
+}
+
+fn attempt<F: DistanceField>(
+    path: &SearchPath,
+    section: &DriveSection,
+    context: &Context<'_, F>,
+    options: &OptimizeOptions,
+) -> SolvedLeg {
     let first = guess(path, section, &context.limits, options);
     let minco = Minco::new(first.pieces, &first.start, &first.end);
     let clearance = context.clearance.clone();
     let mut objective = Objective::new(context.robot, context.field, minco, section.reverse, clearance, options);
     let mut iteration = Lbfgs::new(objective.dimension(), options.lbfgs.clone());
-    let mut x = first.variables;
+    let mut x = first.variables.clone();
+    let guessed: f64 = x[x.len() - first.pieces..].iter().map(|tau| time_map::duration(*tau).0).sum();
     let judged_at = options.samples_per_piece.max(1) * JUDGE_DENSITY;
     let (mut iterations, mut cost, mut ending) = (0, f64::NAN, Ending::Converged);
     let mut violation = Violation { motion: f64::INFINITY, clearance: f64::INFINITY };
@@ -99,19 +131,30 @@ pub(crate) fn solve<F: DistanceField>(
         }
         if near {
             objective.weights.clearance *= options.weight_growth;
+            objective.tighten(violation.clearance.min(options.clearance_tolerance));
         }
     }
-    let checked = objective.violation(&x, judged_at);
-    if violation.motion.is_finite() {
-        violation = checked;
-    }
-    let curve = real_time(objective.curve());
     let (from, to) = (path.states[section.first].pose.yaw, path.states[section.last].pose.yaw);
-    let leg = DriveLeg { curve, reverse: section.reverse, yaw_start: from };
-    let slack = options.clearance_tolerance;
-    let sound = violation.motion < HOPELESS
-        && violation.clearance < slack
-        && heading_at_end(&leg, judged_at).is_some_and(|yaw| (yaw - to).abs() < 0.05);
+    let leg_of = |curve: &Minco| DriveLeg { curve: real_time(curve), reverse: section.reverse, yaw_start: from };
+    let keeps_heading =
+        |leg: &DriveLeg| heading_at_end(leg, judged_at).is_some_and(|yaw| (yaw - to).abs() < HEADING_TOLERANCE);
+    let judged = objective.violation(&x, judged_at);
+    let mut leg = leg_of(objective.curve());
+    let mut sound = violation.motion < HOPELESS && violation.clearance < options.clearance_tolerance;
+    // A loop that turns nothing round still keeps every limit: it only takes long.
+    sound &= leg.curve.duration() < DETOUR * guessed + 2.0;
+    if ending == Ending::LineSearchStalled && !violation.motion.is_finite() {
+        sound = false;
+    } else {
+        violation = judged;
+    }
+    if !keeps_heading(&leg) {
+        // A loop or a cusp: the legs that follow would be turned round. On a straight the first guess has neither.
+        sound = false;
+        ending = Ending::LineSearchStalled;
+        objective.violation(&first.variables, 1);
+        leg = leg_of(objective.curve());
+    }
     SolvedLeg { pieces: leg.curve.pieces.len(), leg, iterations, cost, ending, sound, violation }
 }
 
@@ -123,7 +166,8 @@ pub(crate) fn heading_at_end(leg: &DriveLeg, per_piece: usize) -> Option<f64> {
         for k in 0..=per_piece {
             let t = piece.duration * k as f64 / per_piece as f64;
             let next = unwrap_near((side * piece.derivative(1, 1, t)).atan2(side * piece.derivative(0, 1, t)), yaw);
-            if !((next - yaw).abs() < 0.8) {
+            let turn = (next - yaw).abs();
+            if turn.is_nan() || turn > 0.8 {
                 return None;
             }
             yaw = next;

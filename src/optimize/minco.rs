@@ -96,7 +96,7 @@ impl Minco {
     /// A curve of `pieces >= 1` between two end states, `[order * m + dimension]`, orders 0 to 3. No shape until
     /// [`Self::shape`].
     pub fn new(pieces: usize, start: &[f64], end: &[f64]) -> Self {
-        debug_assert!(pieces >= 1 && start.len() == end.len() && start.len() % ORDERS == 0);
+        debug_assert!(pieces >= 1 && start.len() == end.len() && start.len().is_multiple_of(ORDERS));
         let dimensions = start.len() / ORDERS;
         let mut states = vec![0.0; (pieces + 1) * ORDERS * dimensions];
         states[..start.len()].copy_from_slice(start);
@@ -180,9 +180,8 @@ impl Minco {
                     }
                 }
             }
-            let t2 = t * t;
-            let unit = [t, t2, t2 * t];
-            let weight = 1.0 / (t2 * t2 * t2 * t);
+            let unit = [t, t * t, t * t * t];
+            let weight = inverse_seventh(t);
             for d in 0..m {
                 let state = |node: usize, order: usize| self.states[(node * ORDERS + order) * m + d];
                 let rise = state(piece + 1, 0) - state(piece, 0);
@@ -252,7 +251,7 @@ impl Minco {
         let mut sum = 0.0;
         for piece in 0..self.pieces {
             let t = self.durations[piece];
-            let scale = 1.0 / t.powi(7);
+            let scale = inverse_seventh(t);
             for d in 0..m {
                 let c = self.high_coefficients(piece, d);
                 let energy = unit_energy(&c);
@@ -319,10 +318,10 @@ impl Minco {
     /// the energy's bilinear form of the curve and of the curve with Hermite data lambda.
     fn subtract_adjoint(&mut self, by_durations: &mut [f64]) {
         let m = self.dimensions;
-        for piece in 0..self.pieces {
+        for (piece, by_duration) in by_durations.iter_mut().enumerate() {
             let t = self.durations[piece];
             let unit = [t, t * t, t * t * t];
-            let scale = 1.0 / t.powi(7);
+            let scale = inverse_seventh(t);
             let node = piece * ORDERS * m;
             for d in 0..m {
                 let lambda = |at: Option<usize>| -> [f64; 3] {
@@ -340,12 +339,17 @@ impl Minco {
                     form += own;
                     stretch += (k + 1) as f64 * (own + from[k] * forces[k + 1] + to[k] * forces[k + 5]);
                 }
-                by_durations[piece] -= scale / t * (stretch - 7.0 * form);
+                *by_duration -= scale / t * (stretch - 7.0 * form);
                 self.state_gradient[node + d] -= scale * back[0];
                 self.state_gradient[node + ORDERS * m + d] -= scale * back[4];
+                // Inner derivatives are unknowns, not inputs: only the two ends' are wanted.
                 for k in 0..3 {
-                    self.state_gradient[node + (k + 1) * m + d] -= scale * unit[k] * back[k + 1];
-                    self.state_gradient[node + (ORDERS + k + 1) * m + d] -= scale * unit[k] * back[k + 5];
+                    if piece == 0 {
+                        self.state_gradient[node + (k + 1) * m + d] -= scale * unit[k] * back[k + 1];
+                    }
+                    if piece + 1 == self.pieces {
+                        self.state_gradient[node + (ORDERS + k + 1) * m + d] -= scale * unit[k] * back[k + 5];
+                    }
                 }
             }
         }
@@ -356,6 +360,11 @@ impl Minco {
         let width = ORDERS * self.dimensions;
         (&self.state_gradient[..width], &self.state_gradient[self.pieces * width..])
     }
+}
+
+fn inverse_seventh(t: f64) -> f64 {
+    let t2 = t * t;
+    1.0 / (t2 * t2 * t2 * t)
 }
 
 /// T^(2-7), T^(3-7), ... T^(6-7): scales of entries whose derivative orders (1-based) sum to 2 ... 6.

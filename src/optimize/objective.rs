@@ -118,6 +118,11 @@ impl<'a, F: DistanceField> Objective<'a, F> {
         &self.minco
     }
 
+    /// Aims at `by` m more clearance than before: what a pass missed, between samples or by the penalty's softness.
+    pub fn tighten(&mut self, by: f64) {
+        self.clearance.tighten(by);
+    }
+
     fn shape(&mut self, x: &[f64]) {
         let (waypoints, taus) = x.split_at(self.by_waypoints.len());
         for (duration, tau) in self.durations.iter_mut().zip(taus) {
@@ -196,11 +201,11 @@ impl<'a, F: DistanceField> Objective<'a, F> {
         let mut by_pose = ByPose::default();
         let near = self.sample_clearance(&z, &motion, &mut judge, &mut by_pose);
         let mut cost = self.weights.motion * (motion_cost + joint_cost);
-        if motion_cost > 0.0 {
+        if motion_cost != 0.0 {
             let g = pull_back(&motion, &by, z[1], z[2], z[3]);
             self.push_base(piece, entry, &z, [[0.0; 2], g.0, g.1, g.2], weight * self.weights.motion);
         }
-        if near > 0.0 {
+        if near != 0.0 {
             cost += self.weights.clearance * near;
             let factor = weight * self.weights.clearance;
             // d(heading)/d(d1) = B d1 / v^2: the same forwards and backwards.
@@ -235,7 +240,7 @@ impl<'a, F: DistanceField> Objective<'a, F> {
             let d2 = basis.derivative(c, m, d, 2, rate * rate);
             self.joints[index] = q;
             let (cost, by) = joint::joint(q, d1, d2, &self.limits.joints[index], &mut Penalise(self.limits.width));
-            if cost > 0.0 {
+            if cost != 0.0 {
                 sum += cost;
                 let by = [by[0], by[1], by[2], 0.0];
                 self.push(piece, entry, d, [q, d1, d2, 0.0], by, weight * self.weights.motion);
@@ -277,7 +282,7 @@ impl<'a, F: DistanceField> Objective<'a, F> {
         }
         let share = self.weights.dense / (self.sparse * self.dense_step) as f64;
         self.by_durations[piece] += switch * share * sum;
-        if slope != 0.0 && sum > 0.0 {
+        if slope != 0.0 && sum != 0.0 {
             let factor = -2.0 * slope * sum * share * self.durations[piece];
             self.push_base(piece, centre, &z, [[0.0; 2], z[1], [0.0; 2], [0.0; 2]], factor);
         }
@@ -292,7 +297,7 @@ impl<'a, F: DistanceField> Objective<'a, F> {
         let cost = speed::least_speed(&motion, &self.limits, &mut judge, &mut by)
             + speed::rims(&motion, &self.limits, &mut judge, &mut by)
             + turn::turning(&motion, &self.limits, &mut judge, &mut by);
-        if cost > 0.0 {
+        if cost != 0.0 {
             let g = pull_back(&motion, &by, z[1], z[2], z[3]);
             let share = self.weights.dense * self.durations[piece] / (self.sparse * self.dense_step) as f64;
             self.push_base(piece, entry, &z, [[0.0; 2], g.0, g.1, g.2], factor * share);
@@ -326,7 +331,7 @@ impl<'a, F: DistanceField> Objective<'a, F> {
                 self.sample_clearance(&z, &base, &mut near, &mut ByPose::default());
             }
         }
-        Violation { motion: motion.0, clearance: near.0 * self.clearance.scale() }
+        Violation { motion: motion.0, clearance: self.clearance.missed(near.0) }
     }
 }
 

@@ -50,6 +50,8 @@ struct BodyFrame {
 pub struct ClearancePenalty {
     contour: Contour,
     clearance: f64,
+    /// How much of `clearance` was not asked for at first, m.
+    tightened: f64,
     /// Violations are divided by this, m.
     scale: f64,
     slack: f64,
@@ -78,6 +80,7 @@ impl ClearancePenalty {
         Self {
             contour,
             clearance,
+            tightened: 0.0,
             scale,
             slack: INTERPOLATION_SLACK * cell,
             poses: Vec::with_capacity(bodies),
@@ -176,8 +179,49 @@ impl ClearancePenalty {
 }
 
 impl ClearancePenalty {
-    /// Metres that count as one.
-    pub(crate) fn scale(&self) -> f64 {
-        self.scale
+    /// Wants `by` m more than before.
+    pub(crate) fn tighten(&mut self, by: f64) {
+        self.clearance += by;
+        self.tightened += by;
+    }
+
+    /// The worst constraint value as metres missed of the clearance first asked for.
+    pub(crate) fn missed(&self, worst: f64) -> f64 {
+        worst * self.scale - self.tightened
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Penalise;
+    use super::*;
+    use crate::optimize::test_robot::{Boxes, robot};
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn dismissing_patches_changes_no_cost(x in -1.0..1.0f64, y in -1.0..1.0f64, yaw in -3.0..3.0f64, q in 0.0..3.0f64) {
+            let robot = robot(2);
+            let field = Boxes(vec![([0.5, 0.4, 0.0], [0.7, 1.5, 1.0]), ([-0.9, -0.8, 0.3], [0.0, -0.5, 0.5])]);
+            let contour = Contour::new(&robot, 0.06);
+            let mut penalty = ClearancePenalty::new(contour.clone(), robot.bodies.len(), 0.15, 0.05, 0.0);
+            let joints = [q, 0.1];
+            let (mut by_pose, mut by_joints) = (ByPose::default(), [0.0; 2]);
+            let heading = [yaw.cos(), yaw.sin()];
+            let judge = &mut Penalise(0.1);
+            let cost = penalty.add(&robot, &field, [x, y], heading, &joints, judge, &mut by_pose, &mut by_joints);
+            let mut poses = Vec::new();
+            robot.body_poses(&joints, &mut poses);
+            let base = crate::geom::Pose2::new(x, y, yaw).isometry();
+            let mut sum = 0.0;
+            for shape in &contour.shapes {
+                let whole = shape.patches[0];
+                for point in &contour.points[whole.first..whole.last] {
+                    let p = base * poses[shape.body] * point.at;
+                    sum += judge.weigh((0.15 + point.radius - field.distance(p.coords.into())) / 0.05).0;
+                }
+            }
+            prop_assert!((cost - sum).abs() < 1e-9 * (1.0 + sum), "{cost} vs {sum}");
+        }
     }
 }
