@@ -227,11 +227,33 @@ fn greatest(shape: &Shape, turn: &Matrix3<f64>, at: &Vector3<f64>, of: impl Fn(V
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Isometry3;
     use proptest::prelude::*;
 
     use super::*;
     use crate::certify::rollout::Rollout;
-    use crate::certify::tests::robots::{any_motion, any_robot, commands, cut};
+    use crate::certify::tests::robots::*;
+
+    #[test]
+    fn the_acceleration_of_coaxial_joints_is_that_of_one_turning_at_the_sum_of_their_rates() {
+        let mut robot = with_joint(with_joint(bare_robot(), false), false);
+        for joint in [0, 1] {
+            robot = with_body(robot, joint, Isometry3::identity(), [0.0, 0.0, 1.0], (joint, 1.0, 0.0));
+        }
+        let point = Convex::Hull { vertices: vec![[0.0; 3]] };
+        robot = with_shape(robot, 2, Isometry3::translation(0.5, 0.0, 0.0), point);
+        let kinematics = Kinematics::new(&robot);
+        let held = Held { speed: 0.0, turn_rate: 0.7, rates: &[1.1, 1.3] };
+        let bound = kinematics.acceleration(0, held, &[0.0, 0.0]);
+        assert!((bound - 3.1 * 3.1 * 0.5).abs() < 1e-12, "{bound}");
+        // A slide away from the base's turning axis: Coriolis and centripetal.
+        let mut slide =
+            with_body(with_joint(bare_robot(), true), 0, Isometry3::identity(), [1.0, 0.0, 0.0], (0, -2.0, 0.1));
+        slide = with_shape(slide, 1, Isometry3::identity(), Convex::Hull { vertices: vec![[0.0; 3]] });
+        let held = Held { speed: 0.3, turn_rate: 0.7, rates: &[1.1] };
+        let bound = Kinematics::new(&slide).acceleration(0, held, &[0.4]);
+        assert!((bound - 0.7 * (0.3 + 0.7 * 0.9 + 2.0 * 2.2)).abs() < 1e-12, "{bound}");
+    }
 
     proptest! {
         #[test]
