@@ -19,14 +19,14 @@
 //! | [`emit`] | bytes | `CommandTable`, `Report` |
 //!
 //! # Papers
-//! *[SCR]*: Zhang, Xu, Gao, Cao, "Trajectory Optimization for 3D Shape-Changing Robots with Differential Mobile Base".
-//! *[CONV]*: Yang, Choi, "Joint Space Trajectory Planning Considering Physical Limits with Convolution Operator for Mobile
+//! *\[SCR\]*: Zhang, Xu, Gao, Cao, "Trajectory Optimization for 3D Shape-Changing Robots with Differential Mobile Base".
+//! *\[CONV\]*: Yang, Choi, "Joint Space Trajectory Planning Considering Physical Limits with Convolution Operator for Mobile
 //! Robots".
 //!
 //! # Glossary
 //! *clearance*: distance from the robot's surface to the nearest obstacle's surface, negative inside. *track width*: distance
-//! between the driving wheels ([SCR]: wheelbase `d_wb`, [CONV]: `D`). *joints*: the moving joints that change the shape
-//! ([SCR]: SC-DOF). *posture*: one value for every joint. *piece*: one polynomial; *waypoint*: joins two pieces. *leg*: a
+//! between the driving wheels (\[SCR\]: wheelbase `d_wb`, \[CONV\]: `D`). *joints*: the moving joints that change the shape
+//! (\[SCR\]: SC-DOF). *posture*: one value for every joint. *piece*: one polynomial; *waypoint*: joins two pieces. *leg*: a
 //! stretch of motion from rest to rest. *travel*: path length of a wheel's rim, signed.
 
 pub mod certify;

@@ -122,54 +122,77 @@ impl Run<'_> {
     }
 }
 
-/// Compiles one mission. `progress` is told the name of each stage as it begins.
-pub fn compile(inputs: &mut Inputs, options: &CompileOptions, progress: &mut dyn FnMut(&'static str)) -> Outcome {
-    let report = Report::new(inputs_part(inputs));
-    let mut run = Run { report, timings: Vec::new(), progress };
-    let result = stages(inputs, options, &mut run);
-    let Run { mut report, timings, .. } = run;
-    match result {
-        Ok(compiled) => Outcome { report, compiled: Some(compiled), diagnostics: None, timings },
-        Err(diagnostics) => {
-            report.fail(&diagnostics);
-            Outcome { report, compiled: None, diagnostics: Some(diagnostics), timings }
+impl Run<'_> {
+    fn end(self, result: Result<Compiled, Diagnostics>) -> Outcome {
+        let Run { mut report, timings, .. } = self;
+        match result {
+            Ok(compiled) => Outcome { report, compiled: Some(compiled), diagnostics: None, timings },
+            Err(diagnostics) => {
+                report.fail(&diagnostics);
+                Outcome { report, compiled: None, diagnostics: Some(diagnostics), timings }
+            }
         }
     }
 }
 
-fn stages(inputs: &mut Inputs, options: &CompileOptions, run: &mut Run<'_>) -> Result<Compiled, Diagnostics> {
-    let sampling_time = options.sampling_time.unwrap_or(inputs.mission.sampling_time);
-    let World { robot, map } = run.stage("read", || world(inputs))?;
-    run.report.robot = Some((&robot).into());
-    run.report.map = map.as_ref().map(Into::into);
-    let mission = &inputs.mission;
-    let finish = Finish { mission, robot: &robot, map: map.as_ref(), sampling_time };
+/// Compiles one mission. `progress` is told the name of each stage as it begins.
+pub fn compile(inputs: &mut Inputs, options: &CompileOptions, progress: &mut dyn FnMut(&'static str)) -> Outcome {
+    let mut run = Run { report: Report::new(inputs_part(inputs)), timings: Vec::new(), progress };
+    let result = run.stage("read", || world(inputs)).and_then(|world| {
+        let trajectory = match &inputs.mission.path {
+            Some(path) => Some(given_path(&inputs.mission, path, inputs.path_csv.as_ref(), &world.robot)?),
+            None => None,
+        };
+        stages(&mut run, &inputs.mission, &world, trajectory, options)
+    });
+    run.end(result)
+}
 
-    let made = match &mission.path {
-        Some(path) => {
-            let trajectory = given_path(mission, path, inputs.path_csv.as_ref(), &robot)?;
-            finish.certify(run, trajectory)?
-        }
-        None => {
-            let map = map.as_ref().expect("the mission reader asks for a map where no path is given");
-            plan(run, &finish, map)?
+/// Compiles a mission whose robot and map are there already: the map (or a given path) is the caller's, files that the mission
+/// names are not looked at. For suites of many scenes.
+pub fn compile_in(mission: &Mission, world: &World, options: &CompileOptions) -> Outcome {
+    let mut run = Run { report: Report::new(InputsPart::default()), timings: Vec::new(), progress: &mut |_| {} };
+    let result = stages(&mut run, mission, world, None, options);
+    run.end(result)
+}
+
+fn stages(
+    run: &mut Run<'_>,
+    mission: &Mission,
+    world: &World,
+    given: Option<Trajectory>,
+    options: &CompileOptions,
+) -> Result<Compiled, Diagnostics> {
+    let sampling_time = options.sampling_time.unwrap_or(mission.sampling_time);
+    let World { robot, map } = world;
+    run.report.robot = Some(robot.into());
+    run.report.map = map.as_ref().map(Into::into);
+    let finish = Finish { mission, robot, map: map.as_ref(), sampling_time };
+    let made = match (given, map) {
+        (Some(trajectory), _) => finish.certify(run, trajectory)?,
+        (None, Some(map)) => plan(run, &finish, map)?,
+        (None, None) => {
+            let message = "the mission has neither a map nor a path of its own";
+            return Err(Diagnostic::error("mission/no-map", message).into());
         }
     };
     let Made { profile, commands, certificate, trajectory } = made;
     let own = match trajectory.source {
-        TrajectorySource::Optimised => metrics::of_trajectory(&trajectory, &robot),
+        TrajectorySource::Optimised => metrics::of_trajectory(&trajectory, robot),
         _ => metrics::of_commands(&commands),
     };
     run.report.trajectory = Some(TrajectoryPart::new(&trajectory, Some(own)));
-    run.report.profile = Some(profile_part(&profile));
+    run.report.profile = Some(profile_part(&profile, &commands));
     run.report.commands = Some((&commands).into());
     run.report.judge(&certificate);
     if !certificate.holds() {
         return Err(refused(&certificate).into());
     }
-    let rows = run.stage("path_error", || finish.path_errors(&profile, &trajectory));
-    run.report.path_error = rows?;
-    Ok(Compiled { robot, commands, certificate })
+    if !mission.path_error_times.is_empty() {
+        let rows = run.stage("path_error", || finish.path_errors(&profile, &trajectory));
+        run.report.path_error = rows?;
+    }
+    Ok(Compiled { robot: robot.clone(), commands, certificate })
 }
 
 /// The robot and the map, checked against what the mission says of them.
@@ -219,8 +242,10 @@ fn unknown_joints(mission: &Mission, robot: &RobotModel) -> Vec<Diagnostic> {
                 continue;
             };
             if *value < joint.lower - 1e-9 || *value > joint.upper + 1e-9 {
-                let message =
-                    format!("`{under}.joints.{name}` is {value}, outside its limits {} to {}", joint.lower, joint.upper);
+                let message = format!(
+                    "`{under}.joints.{name}` is {value}, outside its limits {} to {}",
+                    joint.lower, joint.upper
+                );
                 faults.push(
                     Diagnostic::error("mission/joint-out-of-limits", message)
                         .maybe_at(span(under, name))
@@ -238,6 +263,12 @@ struct Made {
     profile: MotionProfile,
     commands: CommandTable,
     certificate: Certificate,
+}
+
+impl Made {
+    fn if_certified(self) -> Result<Self, ()> {
+        if self.certificate.holds() { Ok(self) } else { Err(()) }
+    }
 }
 
 /// Searches and optimises until something is certified; the search's own path is the last try.
@@ -263,10 +294,8 @@ fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap) -> Result<Made, 
         let options = OptimizeOptions { clearance: mission.clearance + margin, ..Default::default() };
         let trajectory = run.stage("optimize", || optimize::optimize(&path, &field, robot, &options));
         // A trajectory that no law can time is one more reason to go on to the next try.
-        if let Ok(made) = finish.certify(run, trajectory) {
-            if made.certificate.holds() {
-                return Ok(made);
-            }
+        if let Ok(made) = finish.certify(run, trajectory).map_err(drop).and_then(Made::if_certified) {
+            return Ok(made);
         }
     }
     finish.certify(run, path.trajectory())
@@ -348,7 +377,8 @@ fn end_of(trajectory: &Trajectory) -> Pose2 {
         Leg::Still(still) => Pose2 { yaw: still.yaw_end, ..still.pose },
         Leg::Drive(drive) => {
             let end = drive.curve.duration();
-            let [x, y, dx, dy] = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(d, order)| drive.curve.derivative(d, order, end));
+            let [x, y, dx, dy] =
+                [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(d, order)| drive.curve.derivative(d, order, end));
             let yaw = dy.atan2(dx) + if drive.reverse { std::f64::consts::PI } else { 0.0 };
             Pose2::new(x, y, wrap_angle(yaw))
         }
@@ -387,8 +417,11 @@ fn given_path(
     robot: &RobotModel,
 ) -> Result<Trajectory, Diagnostics> {
     let start = mission.start.clone().unwrap_or_default();
-    let held: Vec<f64> =
-        robot.joints.iter().map(|j| start.joints.get(&j.name).copied().unwrap_or(0f64.clamp(j.lower, j.upper))).collect();
+    let held: Vec<f64> = robot
+        .joints
+        .iter()
+        .map(|j| start.joints.get(&j.name).copied().unwrap_or(0f64.clamp(j.lower, j.upper)))
+        .collect();
     let trajectory = match (path, csv) {
         (PathSpec::Bezier(segments), _) => given::from_bezier(segments, &held)?,
         (PathSpec::File(_), Some(csv)) => given::from_csv(&csv.name, &csv.text, robot, &held)?,
@@ -399,11 +432,15 @@ fn given_path(
     };
     let (first, _) = start_of(&trajectory);
     let last = end_of(&trajectory);
-    let ends = [("start", &mission.start, first, &mission.spans.start), ("goal", &mission.goal, last, &mission.spans.goal)];
+    let ends =
+        [("start", &mission.start, first, &mission.spans.start), ("goal", &mission.goal, last, &mission.spans.goal)];
     for (which, spec, own, span) in ends {
         let Some(spec) = spec else { continue };
         let off = |a: Option<f64>, b: f64| a.is_some_and(|a| (a - b).abs() > 1e-6);
-        if off(spec.x, own.x) || off(spec.y, own.y) || spec.yaw.is_some_and(|yaw| wrap_angle(yaw - own.yaw).abs() > 1e-6) {
+        if off(spec.x, own.x)
+            || off(spec.y, own.y)
+            || spec.yaw.is_some_and(|yaw| wrap_angle(yaw - own.yaw).abs() > 1e-6)
+        {
             let message = format!(
                 "`{which}` contradicts the given path, which has x {:.6}, y {:.6}, heading {:.6} rad there",
                 own.x, own.y, own.yaw
@@ -421,10 +458,11 @@ fn refused(certificate: &Certificate) -> Diagnostic {
         .hint("lower `clearance_m` or the speed limits, or shorten `sampling_time_s`")
 }
 
-fn profile_part(profile: &MotionProfile) -> ProfilePart {
+fn profile_part(profile: &MotionProfile, commands: &CommandTable) -> ProfilePart {
     ProfilePart {
         time_law: profile.law_name(),
-        time_s: profile.time(),
+        // As sampled: sampling may slow down a little more.
+        time_s: commands.duration(),
         v_max_mps: Some(profile.v_max()),
         v_comp_mps: Some(profile.v_comp()),
     }
@@ -459,7 +497,8 @@ pub fn check(inputs: &mut Inputs, table: &CommandTable) -> Result<Certificate, D
     let expected: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
     let found: Vec<&str> = table.joints.iter().map(|(name, _)| name.as_str()).collect();
     if expected != found {
-        let message = format!("the commands move joints [{}], the robot has [{}]", found.join(", "), expected.join(", "));
+        let message =
+            format!("the commands move joints [{}], the robot has [{}]", found.join(", "), expected.join(", "));
         return Err(Diagnostic::error("check/joints", message).into());
     }
     let Some(first) = table.rows.first() else {
@@ -507,7 +546,10 @@ pub fn check(inputs: &mut Inputs, table: &CommandTable) -> Result<Certificate, D
 ///
 /// # Errors
 /// Bad inputs.
-pub fn path_error_of_commands(inputs: &mut Inputs, table: &CommandTable) -> Result<crate::report::PathErrorRow, Diagnostics> {
+pub fn path_error_of_commands(
+    inputs: &mut Inputs,
+    table: &CommandTable,
+) -> Result<crate::report::PathErrorRow, Diagnostics> {
     let World { robot, .. } = world(inputs)?;
     let mission = &inputs.mission;
     let Some(first) = table.rows.first() else {

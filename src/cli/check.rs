@@ -47,13 +47,18 @@ pub(super) fn read_commands(path: &Path) -> Result<CommandFile, Diagnostics> {
 }
 
 /// The mission of a command file: named on the command line, or by the file.
-pub(super) fn mission_of(commands: &Path, header: &CsvHeader, asked: Option<&Path>) -> Result<(Inputs, Disk), Diagnostics> {
+pub(super) fn mission_of(
+    commands: &Path,
+    header: &CsvHeader,
+    asked: Option<&Path>,
+) -> Result<(Inputs, Disk), Diagnostics> {
     match asked {
         Some(path) => inputs::read(path),
         None => {
             let path = tidy(&folder_of(commands).join(&header.mission));
             if !path.is_file() {
-                let message = format!("`{}` names the mission `{}`, which is not there", commands.display(), path.display());
+                let message =
+                    format!("`{}` names the mission `{}`, which is not there", commands.display(), path.display());
                 let fault = Diagnostic::error("check/mission-missing", message);
                 return Err(fault.hint("say which one with --mission MISSION.yaml").into());
             }

@@ -13,7 +13,7 @@ use crate::report::{PathErrorRow, summary};
 
 /// Compile one mission into certified command files.
 ///
-/// Writes OUT/<mission name>/: commands.csv, commands.mcap, path_error.csv, report.json, commands.d and timings.json, all or none.
+/// Writes OUT/MISSION/: commands.csv, commands.mcap, path_error.csv, report.json, commands.d and timings.json, all or none.
 /// Exit 0: certified. 1: no trajectory or no certificate (report.json says why, older command files are removed). 2: bad input.
 #[derive(Debug, clap::Args)]
 pub struct CompileArgs {
@@ -87,10 +87,8 @@ fn run(args: &CompileArgs, name: &str, terminal: &mut Terminal) -> Result<u8, Di
     let options = CompileOptions { sampling_time: args.sampling_time };
     let outcome = pipeline::compile(&mut inputs, &options, &mut |stage| progress.stage(stage));
     drop(progress);
-    if let Some(diagnostics) = &outcome.diagnostics {
-        if diagnostics.severity() == Severity::BadInput {
-            return Err(diagnostics.clone());
-        }
+    if let Some(diagnostics) = outcome.diagnostics.as_ref().filter(|d| d.severity() == Severity::BadInput) {
+        return Err(diagnostics.clone());
     }
     let written = write(args, name, &inputs, &disk, &outcome, read)?;
     let text = if args.json {
@@ -98,7 +96,12 @@ fn run(args: &CompileArgs, name: &str, terminal: &mut Terminal) -> Result<u8, Di
     } else {
         let folder = args.out.join(name).display().to_string();
         let files: Vec<&str> = written.iter().map(String::as_str).collect();
-        summary::render(&summary::SummaryInputs { mission: name, report: &outcome.report, folder: &folder, files: &files })
+        summary::render(&summary::SummaryInputs {
+            mission: name,
+            report: &outcome.report,
+            folder: &folder,
+            files: &files,
+        })
     };
     terminal.print(&text);
     if let Some(diagnostics) = &outcome.diagnostics {

@@ -12,13 +12,16 @@ use crate::pipeline::{Inputs, MapFile, TextFile};
 use crate::robot::Files;
 use crate::robot::spec;
 
+/// A file's name and bytes.
+type Named = (String, Vec<u8>);
+
 /// Reads files from the disk and remembers which.
 #[derive(Clone, Default)]
 pub struct Disk {
     /// Path and hash of each file read, in order.
     read: Rc<RefCell<Vec<(PathBuf, blake3::Hash)>>>,
     /// What the robot stage read.
-    meshes: Rc<RefCell<Vec<(String, Vec<u8>)>>>,
+    meshes: Rc<RefCell<Vec<Named>>>,
 }
 
 impl Disk {
@@ -28,7 +31,7 @@ impl Disk {
     }
 
     /// Meshes read so far: name by which the robot stage asked for each, and bytes.
-    pub fn meshes(&self) -> Vec<(String, Vec<u8>)> {
+    pub fn meshes(&self) -> Vec<Named> {
         self.meshes.borrow().clone()
     }
 

@@ -56,7 +56,8 @@ pub fn inspect(args: &InspectArgs, terminal: &mut Terminal) -> Result<u8, Diagno
 
 fn kind_of_yaml(path: &Path) -> Result<YamlKind, Diagnostics> {
     let text = Disk::default().text(path, None)?.text;
-    let has = |key: &str| text.lines().any(|line| line.starts_with(key) && line[key.len()..].trim_start().starts_with(':'));
+    let has =
+        |key: &str| text.lines().any(|line| line.starts_with(key) && line[key.len()..].trim_start().starts_with(':'));
     if has("image") && has("resolution") {
         Ok(YamlKind::Map)
     } else if has("urdf") || has("drive") {
@@ -77,8 +78,12 @@ fn of_robot(path: &Path) -> Result<String, Diagnostics> {
     let (spec, _, urdf) = read_robot_files(path, &disk, None)?;
     let overrides = LimitsSpec::default();
     let mut files = disk.clone();
-    let robot =
-        robot::parse(RobotInputs { spec: &spec, urdf: (&urdf.name, &urdf.text), files: &mut files, overrides: &overrides })?;
+    let robot = robot::parse(RobotInputs {
+        spec: &spec,
+        urdf: (&urdf.name, &urdf.text),
+        files: &mut files,
+        overrides: &overrides,
+    })?;
     Ok(robot.describe())
 }
 
@@ -89,7 +94,8 @@ fn of_map(args: &InspectArgs, path: &Path) -> Result<String, Diagnostics> {
         return Err(Diagnostic::error("inspect/height", message).hint("give the lower end first, metres").into());
     }
     let file = read_map_file(path, &Disk::default(), None)?;
-    let points = !["yaml", "yml", "npy"].iter().any(|e| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(e)));
+    let points =
+        !["yaml", "yml", "npy"].iter().any(|e| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(e)));
     let spec = MapSpec {
         file: path.to_path_buf(),
         resolution: points.then_some(args.resolution),

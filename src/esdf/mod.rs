@@ -34,7 +34,15 @@ pub fn build(map: &VoxelMap) -> Esdf {
     let values = transform::signed_distance(map, nodes);
     let inverse_resolution = 1.0 / map.resolution;
     let last = map.dims.map(|d| d as f64);
-    Esdf { resolution: map.resolution, inverse_resolution, last, origin: map.origin, nodes, outside: map.outside, values }
+    Esdf {
+        resolution: map.resolution,
+        inverse_resolution,
+        last,
+        origin: map.origin,
+        nodes,
+        outside: map.outside,
+        values,
+    }
 }
 
 impl Esdf {
@@ -119,9 +127,9 @@ mod tests {
             if inside && out > 0.0 {
                 prop_assert!(value >= out - 0.87 * map.resolution);
             }
-            for a in 0..3 {
+            for (p, origin) in p.iter().zip(map.origin) {
                 // away from the cell faces, where the gradient jumps
-                let fraction = ((p[a] - map.origin[a]) / map.resolution).fract().abs();
+                let fraction = ((p - origin) / map.resolution).fract().abs();
                 prop_assume!(fraction > 1e-4 && fraction < 1.0 - 1e-4);
             }
             let h = 1e-6;

@@ -1,4 +1,4 @@
-//! The exact distance transform: one pass per axis, each O(nodes) (Felzenszwalb & Huttenlocher 2012, cited by [SCR] as [22]).
+//! The exact distance transform: one pass per axis, each O(nodes) (Felzenszwalb & Huttenlocher 2012, cited by \[SCR\] as [22]).
 
 use super::FAR;
 use crate::map::VoxelMap;

@@ -1,11 +1,11 @@
 //! L-BFGS with the weak-Wolfe bisection of Lewis and Overton, for smooth and piecewise smooth functions.
 //!
-//! *[LO]*: Lewis, Overton, "Nonsmooth optimization via quasi-Newton methods", Math. Program. 141 (2013). *[LN]*: Liu, Nocedal,
-//! "On the limited memory BFGS method for large scale optimization" ([SCR]'s reference 21).
+//! *\[LO\]*: Lewis, Overton, "Nonsmooth optimization via quasi-Newton methods", Math. Program. 141 (2013). *\[LN\]*: Liu, Nocedal,
+//! "On the limited memory BFGS method for large scale optimization" (\[SCR\]'s reference 21).
 
-/// Decrease that a step must give, as a share of what the slope promises ([LO] section 2: `c1`).
+/// Decrease that a step must give, as a share of what the slope promises (\[LO\] section 2: `c1`).
 const SUFFICIENT_DECREASE: f64 = 1e-4;
-/// Share of the slope that may be left after a step ([LO]: `c2`).
+/// Share of the slope that may be left after a step (\[LO\]: `c2`).
 const CURVATURE: f64 = 0.9;
 
 /// How to iterate.
@@ -155,7 +155,7 @@ impl Lbfgs {
         }
     }
 
-    /// Two-loop recursion ([LN] algorithm 2.1); returns the slope along the direction.
+    /// Two-loop recursion (\[LN\] algorithm 2.1); returns the slope along the direction.
     fn find_direction(&mut self, stored: usize, newest: usize) -> f64 {
         let (n, memory) = (self.dimension, self.options.memory);
         for (d, g) in self.direction.iter_mut().zip(&self.gradient) {
@@ -181,7 +181,7 @@ impl Lbfgs {
         dot(&self.gradient, &self.direction)
     }
 
-    /// Bisection for the weak Wolfe conditions ([LO] algorithm 2.6); leaves the point in `trial`. Where the conditions are
+    /// Bisection for the weak Wolfe conditions (\[LO\] algorithm 2.6); leaves the point in `trial`. Where the conditions are
     /// never met but some step lowered the cost enough, the last such step is taken.
     fn line_search(
         &mut self,

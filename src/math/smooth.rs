@@ -1,6 +1,6 @@
 //! Smooth versions of `max(x, 0)` and of the unit step. Each returns the value and its derivative.
 
-/// One-sided penalty `L_1` of [SCR] section IV-B: 0 for `x <= 0`, `x - a0/2` for `x >= a0`, a quartic between; `a0 > 0`.
+/// One-sided penalty `L_1` of \[SCR\] section IV-B: 0 for `x <= 0`, `x - a0/2` for `x >= a0`, a quartic between; `a0 > 0`.
 /// Twice continuously differentiable and convex.
 ///
 /// # Deviation
@@ -18,7 +18,7 @@ pub fn smooth_positive(x: f64, a0: f64) -> (f64, f64) {
     }
 }
 
-/// Switch from 0 to 1 that turns dense sampling on, `L_a` of [SCR] Eq. 10; blends over `[-eps, eps]`, `eps > 0`.
+/// Switch from 0 to 1 that turns dense sampling on, `L_a` of \[SCR\] Eq. 10; blends over `[-eps, eps]`, `eps > 0`.
 /// Twice continuously differentiable.
 pub fn smooth_switch(x: f64, eps: f64) -> (f64, f64) {
     debug_assert!(eps > 0.0);

@@ -151,9 +151,9 @@ pub enum TimeLaw {
     Wheel,
     /// `v' = v_max / (1 + D/2 max|curvature|)`.
     FixedPoint,
-    /// [CONV] Eq. 5, true arc length.
+    /// \[CONV\] Eq. 5, true arc length.
     Eq5,
-    /// [CONV] Eq. 2 and 5 as printed.
+    /// \[CONV\] Eq. 2 and 5 as printed.
     Printed,
     /// The optimiser's own timing.
     Minco,
@@ -196,7 +196,7 @@ pub struct BaseLimitsSpec {
     pub angular_speed: Option<f64>,
     /// rad/s^2.
     pub angular_acceleration: Option<f64>,
-    /// [SCR] Eq. 14.
+    /// \[SCR\] Eq. 14.
     pub eta: Option<f64>,
     /// m/s.
     pub min_speed: Option<f64>,

@@ -1,4 +1,4 @@
-//! From the flat output to the base's speeds and accelerations, [SCR] Eq. 3, forwards and backwards.
+//! From the flat output to the base's speeds and accelerations, \[SCR\] Eq. 3, forwards and backwards.
 
 /// Speeds below this are treated as this, m/s: the flat output has no heading at rest.
 const SPEED_FLOOR: f64 = 1e-6;

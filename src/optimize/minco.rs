@@ -1,8 +1,8 @@
-//! MINCO with s = 4 ([SCR] section IV-A): the curve of least integral of the squared fourth derivative through given waypoints
+//! MINCO with s = 4 (\[SCR\] section IV-A): the curve of least integral of the squared fourth derivative through given waypoints
 //! at given durations, in any number of dimensions.
 //!
 //! # Deviation
-//! [SCR] and its source solve one banded system for all 8M coefficients. Eliminating the rows of order 0 to 3 by Hermite's form
+//! \[SCR\] and its source solve one banded system for all 8M coefficients. Eliminating the rows of order 0 to 3 by Hermite's form
 //! leaves the first three derivatives at the M - 1 waypoints as unknowns and the rows of order 4 to 6 as equations. Those are
 //! the optimality conditions of the energy, so the system is symmetric, positive definite and block tridiagonal (3 x 3): about
 //! a tenth of the arithmetic, orders 0 to 3 exact by construction. The same curve; the tests compare with the full system.

@@ -1,4 +1,4 @@
-//! Stage 7: MINCO (s = 4) over (x, y, joints): smooths the search's path under [SCR]'s penalties.
+//! Stage 7: MINCO (s = 4) over (x, y, joints): smooths the search's path under \[SCR\]'s penalties.
 //!
 //! `sections` cuts the path at cusps and large spins; each driven section becomes one curve (`leg`): first guess (`initial`),
 //! cost and gradient ([`objective`] over [`minco`], [`flatness`], [`penalty`], [`contour`]), L-BFGS. A section whose curve is

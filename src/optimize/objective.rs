@@ -1,4 +1,4 @@
-//! Cost of one driven leg and its gradient by waypoints and virtual times: [SCR] Eq. 12.
+//! Cost of one driven leg and its gradient by waypoints and virtual times: \[SCR\] Eq. 12.
 //!
 //! Everything is sampled at fixed *normalised* times, so a piece's duration enters only through the scale T^-order of each
 //! derivative and the quadrature weight; the terms with the derivative of a constraint along the trajectory (MATH section 3)
@@ -60,7 +60,7 @@ pub struct Objective<'a, F> {
     by_joints: Vec<f64>,
 }
 
-/// The switch of [SCR] Eq. 10.
+/// The switch of \[SCR\] Eq. 10.
 #[derive(Debug, Clone, Copy)]
 struct Dense {
     /// v_la squared, m^2/s^2.
@@ -184,7 +184,7 @@ impl<'a, F: DistanceField> Objective<'a, F> {
         self.by_durations[piece] -= factor * rate * stretch;
     }
 
-    /// All sparse penalties at sample `j` of a piece, [SCR] Eq. 9.
+    /// All sparse penalties at sample `j` of a piece, \[SCR\] Eq. 9.
     fn sparse_sample(&mut self, piece: usize, j: usize) -> f64 {
         let entry = j * self.dense_step;
         let half = if j == 0 || j == self.sparse { 0.5 } else { 1.0 };
@@ -263,7 +263,7 @@ impl<'a, F: DistanceField> Objective<'a, F> {
         self.clearance.add(self.robot, self.field, z[0], heading, &self.joints, judge, by_pose, &mut self.by_joints)
     }
 
-    /// The dense sum around sample `j`, [SCR] Eq. 11: least speed, turn rate, angular acceleration; and the rims.
+    /// The dense sum around sample `j`, \[SCR\] Eq. 11: least speed, turn rate, angular acceleration; and the rims.
     fn dense_cell(&mut self, piece: usize, j: usize) -> f64 {
         let Some(dense) = self.dense else { return 0.0 };
         let centre = j * self.dense_step;

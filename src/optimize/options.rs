@@ -11,7 +11,7 @@ pub struct OptimizeOptions {
     /// A leg that ends with less than `clearance - clearance_tolerance` (m) at its contour points is driven stop, spin, go
     /// instead. Default 0.02.
     pub clearance_tolerance: f64,
-    /// Dense sampling on ([SCR] section IV-C). Default true.
+    /// Dense sampling on (\[SCR\] section IV-C). Default true.
     pub dense: bool,
     /// kappa: sparse samples a piece. Default 12.
     pub samples_per_piece: usize,

@@ -1,4 +1,4 @@
-//! Durations without a sign constraint: `T(tau)` of [SCR] section IV-B, twice continuously differentiable.
+//! Durations without a sign constraint: `T(tau)` of \[SCR\] section IV-B, twice continuously differentiable.
 
 /// Duration (> 0) and its derivative for any real `tau`: `tau^2/2 + tau + 1` above 0, `1/(tau^2/2 - tau + 1)` below.
 pub fn duration(tau: f64) -> (f64, f64) {

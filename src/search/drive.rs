@@ -27,7 +27,9 @@ impl SearchPath {
                 SearchMove::Reverse => true,
             };
             match &mut drive {
-                Some(leg) if leg.reverse == reverse && leg.yaw_start == from.pose.yaw => leg.curve.pieces.push(straight(from, to)),
+                Some(leg) if leg.reverse == reverse && leg.yaw_start == from.pose.yaw => {
+                    leg.curve.pieces.push(straight(from, to))
+                }
                 _ => {
                     legs.extend(drive.take().map(Leg::Drive));
                     let curve = PiecewisePoly { pieces: vec![straight(from, to)] };

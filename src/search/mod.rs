@@ -1,8 +1,8 @@
 //! Stage 6: a drivable path on a lattice over (x, y, yaw, posture).
 //!
-//! Resolution-complete: [`search`] returns a path, or the proof that none exists on the lattice ([`lattice`]: positions 5 cm
-//! apart, 72 headings; [`posture`]: 64 values of a joint), every move checked exactly against the occupied cells' cubes as a
-//! sweep. ([SCR] takes a hybrid A* for its initial path; see [`astar`] for what replaces its fourth dimension.)
+//! Resolution-complete: [`search`] returns a path, or the proof that none exists on the lattice (`lattice`: positions 5 cm
+//! apart, 72 headings; `posture`: 64 values of a joint), every move checked exactly against the occupied cells' cubes as a
+//! sweep. (\[SCR\] takes a hybrid A* for its initial path; see `astar` for what replaces its fourth dimension.)
 
 mod astar;
 mod collide;
@@ -297,7 +297,15 @@ fn search_postures<const W: usize>(
         if let Some(checked) = shortcutter.check(route.clone()) {
             let checked = shortcutter.shorten(checked);
             let pieces = checked.route.pieces(grain);
-            return Ok(with_joints(&collider, robot, query, &checked, &pieces, [start_postures, goal_postures], expanded));
+            return Ok(with_joints(
+                &collider,
+                robot,
+                query,
+                &checked,
+                &pieces,
+                [start_postures, goal_postures],
+                expanded,
+            ));
         }
     }
     // The fine check asks no more than the search did, but for the tolerance of the checks.
@@ -537,20 +545,38 @@ pub(crate) mod tests {
             for _ in 0..w[8].parse::<usize>().unwrap() {
                 let b: Vec<f64> = lines.next().unwrap().split(' ').map(|v| v.parse().unwrap()).collect();
                 let r = |v: f64| (v / 0.05).round() as usize;
-                for i in r(b[0])..r(b[3]) { for j in r(b[1])..r(b[4]) { for k in r(b[2])..r(b[5]).min(20) { map.occupy([i, j, k]); } } }
+                for i in r(b[0])..r(b[3]) {
+                    for j in r(b[1])..r(b[4]) {
+                        for k in r(b[2])..r(b[5]).min(20) {
+                            map.occupy([i, j, k]);
+                        }
+                    }
+                }
             }
             let t0 = std::time::Instant::now();
             let esdf = crate::esdf::build(&map);
             let t1 = std::time::Instant::now();
             let query = Query {
-                start: Pose2::new(f(2), f(3), f(4)), start_joints: vec![None],
-                goal: Pose2::new(f(5), f(6), f(7)), goal_yaw: Some(f(7)), goal_joints: vec![None],
+                start: Pose2::new(f(2), f(3), f(4)),
+                start_joints: vec![None],
+                goal: Pose2::new(f(5), f(6), f(7)),
+                goal_yaw: Some(f(7)),
+                goal_joints: vec![None],
             };
             let found = search(&map, &esdf, &robot, &query, &SearchOptions { clearance: 0.02, reverse: false });
             let ms = t1.elapsed().as_secs_f64() * 1e3;
             all.push(ms);
             match found {
-                Ok(p) => println!("{} esdf {:.1} search {:.1} ms expanded {} length {:.2} straight {:.2} moves {}", w[1], (t1 - t0).as_secs_f64() * 1e3, ms, p.expanded, p.length(), query.start.distance(query.goal), p.moves.len()),
+                Ok(p) => println!(
+                    "{} esdf {:.1} search {:.1} ms expanded {} length {:.2} straight {:.2} moves {}",
+                    w[1],
+                    (t1 - t0).as_secs_f64() * 1e3,
+                    ms,
+                    p.expanded,
+                    p.length(),
+                    query.start.distance(query.goal),
+                    p.moves.len()
+                ),
                 Err(e) => println!("{} {:.1} ms {e}", w[1], ms),
             }
         }

@@ -27,7 +27,7 @@ pub fn robot(track_width: f64, wheel: [f64; 3], joints: Vec<MovingJoint>) -> Rob
     }
 }
 
-/// The robot of [CONV] section 3.
+/// The robot of \[CONV\] section 3.
 pub fn conv() -> RobotModel {
     robot(0.4, [0.5, 0.2, 0.2], Vec::new())
 }

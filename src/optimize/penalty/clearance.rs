@@ -1,4 +1,4 @@
-//! Clearance of every contour point, [SCR] Eq. 20 to 23, for any tree of joints.
+//! Clearance of every contour point, \[SCR\] Eq. 20 to 23, for any tree of joints.
 //!
 //! The gradient goes back as forces do: each body gathers force and torque of its points, hands them to its parent, and a joint
 //! feels the part along its axis. The base feels a force (by position) and a torque about z (by heading).

@@ -1,4 +1,4 @@
-//! Joint speed, acceleration ([SCR] Eq. 18, 19) and position (URDF `<limit>`; the paper is silent).
+//! Joint speed, acceleration (\[SCR\] Eq. 18, 19) and position (URDF `<limit>`; the paper is silent).
 
 use super::{JointLimits, Judge};
 

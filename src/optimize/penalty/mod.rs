@@ -1,4 +1,4 @@
-//! Penalties of [SCR] section V at one instant. Each adds its gradient and returns its cost; every constraint is divided by its
+//! Penalties of \[SCR\] section V at one instant. Each adds its gradient and returns its cost; every constraint is divided by its
 //! limit (squared forms by the limit squared) before [`smooth_positive`], so one width and one weight suit all.
 
 pub mod clearance;
@@ -14,7 +14,7 @@ use crate::robot::RobotModel;
 pub struct Limits {
     /// Of the base, m/s.
     pub speed: f64,
-    /// Least speed of the base ([SCR] section V-C), m/s.
+    /// Least speed of the base (\[SCR\] section V-C), m/s.
     pub min_speed: f64,
     /// Of the base along the path, m/s^2.
     pub acceleration: f64,
@@ -22,7 +22,7 @@ pub struct Limits {
     pub angular_speed: f64,
     /// Of the base, rad/s^2.
     pub angular_acceleration: f64,
-    /// `2 eta / D` of [SCR] Eq. 14, rad/m: turn rate gained for every m/s below `speed`.
+    /// `2 eta / D` of \[SCR\] Eq. 14, rad/m: turn rate gained for every m/s below `speed`.
     pub turn_slope: f64,
     /// Half the track width, m.
     pub half_track: f64,

@@ -1,4 +1,4 @@
-//! Speed, least speed and acceleration along the path: [SCR] Eq. 13, 15, 17; and the wheels' rims.
+//! Speed, least speed and acceleration along the path: \[SCR\] Eq. 13, 15, 17; and the wheels' rims.
 
 use super::{Judge, Limits};
 use crate::optimize::flatness::BaseMotion;
@@ -28,7 +28,7 @@ pub(crate) fn least_speed(m: &BaseMotion, limits: &Limits, judge: &mut impl Judg
 }
 
 /// Both rims' speed, `v + D/2 |omega| <= wheel speed`, and acceleration, `|a_l +- D/2 alpha| <= wheel acceleration`.
-/// Not in [SCR]; this is what the time law must keep, whichever way the robot drives.
+/// Not in \[SCR\]; this is what the time law must keep, whichever way the robot drives.
 pub(crate) fn rims(m: &BaseMotion, limits: &Limits, judge: &mut impl Judge, by: &mut BaseMotion) -> f64 {
     let mut sum = 0.0;
     for half in [limits.half_track, -limits.half_track] {

@@ -1,4 +1,4 @@
-//! Turn rate and angular acceleration of the base, [SCR] Eq. 14 and 16, both sides each for itself.
+//! Turn rate and angular acceleration of the base, \[SCR\] Eq. 14 and 16, both sides each for itself.
 
 use super::{Judge, Limits};
 use crate::optimize::flatness::BaseMotion;
