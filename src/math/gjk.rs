@@ -17,36 +17,43 @@ const ITERATIONS: usize = 40;
 /// Distance from the origin to a convex set given by its support function (a farthest point in a direction): for two bodies
 /// A and B their Minkowski difference, `support(d) = a(d) - b(-d)`. `toward` is any first guess at a point of the set.
 ///
-/// Stops as soon as the distance is known to `tolerance`, or to lie on one side of the `threshold`.
+/// Stops as soon as the bounds are good `enough`.
 pub fn distance_from_origin(
     support: impl Fn(&Vector3<f64>) -> Vector3<f64>,
     toward: Vector3<f64>,
-    threshold: Option<f64>,
-    tolerance: f64,
+    enough: impl Fn(Gap) -> bool,
 ) -> Gap {
+    with_direction(support, toward, enough).0
+}
+
+/// [`distance_from_origin`], and the direction from the origin to the nearest point found: the normal of a slab that separates
+/// the bodies, where they are apart.
+pub fn with_direction(
+    support: impl Fn(&Vector3<f64>) -> Vector3<f64>,
+    toward: Vector3<f64>,
+    enough: impl Fn(Gap) -> bool,
+) -> (Gap, Vector3<f64>) {
     let mut simplex = Simplex::new(support(&-toward));
     let mut nearest = simplex.points[0];
     let mut lower = 0.0f64;
     for _ in 0..ITERATIONS {
         let upper = nearest.norm();
         if upper < 1e-12 {
-            return Gap { lower: 0.0, upper: 0.0 };
-        }
-        if threshold.is_some_and(|t| upper < t) {
-            return Gap { lower, upper };
+            return (Gap { lower: 0.0, upper: 0.0 }, nearest);
         }
         let next = support(&-nearest);
         lower = lower.max(nearest.dot(&next) / upper);
-        if threshold.is_some_and(|t| lower >= t) || upper - lower <= tolerance || simplex.has(&next) {
-            return Gap { lower, upper };
+        let gap = Gap { lower, upper };
+        if enough(gap) || simplex.has(&next) {
+            return (gap, nearest);
         }
         simplex.add(next);
         match simplex.reduce() {
             Some(point) => nearest = point,
-            None => return Gap { lower: 0.0, upper: 0.0 },
+            None => return (Gap { lower: 0.0, upper: 0.0 }, nearest),
         }
     }
-    Gap { lower, upper: nearest.norm() }
+    (Gap { lower, upper: nearest.norm() }, nearest)
 }
 
 /// One to four points; after `reduce` those whose hull holds the nearest point to the origin.
@@ -212,7 +219,9 @@ mod tests {
             pose.translation.vector + pose.rotation * shape.support(&pose.rotation.inverse_transform_vector(d))
         };
         let support = |d: &Vector3<f64>| world(a, pose_a, d) - world(b, pose_b, &-d);
-        distance_from_origin(support, pose_a.translation.vector - pose_b.translation.vector, threshold, 1e-9)
+        let enough =
+            |gap: Gap| gap.upper - gap.lower <= 1e-9 || threshold.is_some_and(|t| gap.lower >= t || gap.upper < t);
+        distance_from_origin(support, pose_a.translation.vector - pose_b.translation.vector, enough)
     }
 
     fn pose() -> impl Strategy<Value = Isometry3<f64>> {

@@ -117,11 +117,29 @@ pub(super) struct AStar<'a, const W: usize> {
     pub collider: &'a Collider<'a, W>,
     pub cost_to_go: &'a CostToGo,
     /// Clearance of the robot's core at each position, m; for a quick look along a line.
-    pub core: &'a [f32],
+    pub core_clearances: &'a [f32],
+    /// Whether the small turns into and out of a drive's exact direction are checked on the way, not only at the end.
+    pub strict: bool,
     pub query: &'a Query,
     pub options: &'a SearchOptions,
     pub start_postures: Bits<W>,
     pub goal_postures: Bits<W>,
+}
+
+/// Routes straight from start to goal, not yet checked.
+pub(super) fn straight_to_goal<'a>(query: &'a Query, options: &'a SearchOptions) -> impl Iterator<Item = Route> + 'a {
+    shots(query.start, query, options).map(|(route, _)| route)
+}
+
+/// Spin, drive, spin to the goal: forward, and backwards where allowed.
+fn shots<'a>(from: Pose2, query: &'a Query, options: &SearchOptions) -> impl Iterator<Item = (Route, bool)> + 'a {
+    let senses: &[bool] = if options.reverse { &[false, true] } else { &[false] };
+    senses.to_vec().into_iter().map(move |reverse| {
+        let mut route = Route::new(from);
+        route.drive_to([query.goal.x, query.goal.y], reverse);
+        route.end_with(query.goal_yaw);
+        (route, reverse)
+    })
 }
 
 /// What changes while it runs.
@@ -138,9 +156,6 @@ impl<const W: usize> AStar<'_, W> {
     pub fn search(&self) -> Outcome {
         let mut run =
             Run { labels: Vec::new(), open: BinaryHeap::new(), closed: KeyMap::default(), moves: KeyMap::default() };
-        if let Some(route) = self.straight_to_goal() {
-            return Outcome::Found { route, expanded: 0 };
-        }
         self.leave_start(&mut run);
         let mut expanded = 0;
         let mut since_shot = usize::MAX / 2;
@@ -151,14 +166,22 @@ impl<const W: usize> AStar<'_, W> {
                 return Outcome::Found { route: self.route(&run, label), expanded };
             }
             let state = run.labels[at].state;
-            let closed = run.closed.entry(self.key(state)).or_insert(Bits::EMPTY);
-            let fresh = run.labels[at].postures.minus(*closed);
+            let key = self.key(state);
+            let closed = run.closed.get(&key).copied().unwrap_or(Bits::EMPTY);
+            if closed == self.collider.all() {
+                continue;
+            }
+            // Moves are checked only now: most labels are never looked at again.
+            let free = self.free_along(&mut run, label);
+            let reached = self.collider.neighbours.flood(run.labels[at].postures, free);
+            let fresh = reached.minus(closed);
             if fresh.is_empty() {
                 continue;
             }
-            *closed = closed.or(fresh);
+            run.labels[at].postures = reached;
+            run.closed.insert(key, closed.or(fresh));
             expanded += 1;
-            let to_go = self.estimate(state);
+            let to_go = self.cost_to_go.at(self.lattice, self.lattice.pose(state)).unwrap_or(f64::INFINITY);
             if to_go < closest.0 {
                 closest = (to_go, self.lattice.pose(state));
             }
@@ -179,13 +202,15 @@ impl<const W: usize> AStar<'_, W> {
         (self.lattice.index(state.i, state.j) * HEADINGS) as u64 + state.heading as u64
     }
 
-    /// Cost to go; far where the plane says it is shut off (then the search still looks, last).
-    fn estimate(&self, state: LatticeState) -> f64 {
-        self.cost_to_go.at(self.lattice, state.i, state.j).unwrap_or(1e6)
-    }
-
     fn push(&self, run: &mut Run<W>, label: Label<W>) {
-        let to_go = if let Step::Goal { .. } = label.step { 0.0 } else { self.estimate(label.state) };
+        let to_go = match label.step {
+            Step::Goal { .. } => 0.0,
+            _ => match self.cost_to_go.at(self.lattice, self.lattice.pose(label.state)) {
+                Some(to_go) => to_go,
+                // Shut off: no motion leads from there to the goal.
+                None => return,
+            },
+        };
         run.open.push(Open { estimate: label.cost + WEIGHT * to_go, label: run.labels.len() as u32 });
         run.labels.push(label);
     }
@@ -202,20 +227,9 @@ impl<const W: usize> AStar<'_, W> {
         reached
     }
 
-    fn straight_to_goal(&self) -> Option<Route> {
-        let start = self.query.start;
-        self.shots(start).find_map(|(route, pieces, _)| {
-            (!self.pass(self.start_postures, pieces).and(self.goal_postures).is_empty()).then_some(route)
-        })
-    }
-
-    /// Ways straight to the goal from a pose: forward, and backwards where allowed.
+    /// Ways straight to the goal from a pose, with their pieces.
     fn shots(&self, from: Pose2) -> impl Iterator<Item = (Route, Vec<BaseMotion>, bool)> + '_ {
-        let goal = self.query.goal;
-        [false, true].into_iter().filter(|reverse| !reverse || self.options.reverse).map(move |reverse| {
-            let mut route = Route::new(from);
-            route.drive_to([goal.x, goal.y], reverse);
-            route.end_with(self.query.goal_yaw);
+        shots(from, self.query, self.options).map(|(route, reverse)| {
             let pieces = route.pieces(Grain::COARSE);
             (route, pieces, reverse)
         })
@@ -224,12 +238,12 @@ impl<const W: usize> AStar<'_, W> {
     fn try_goal(&self, run: &mut Run<W>, parent: u32) {
         let Label { state, postures, cost, .. } = run.labels[parent as usize];
         let from = self.lattice.pose(state);
-        if !self.line_of_sight([from.x, from.y], [self.query.goal.x, self.query.goal.y]) {
-            return;
-        }
         let found: Vec<(f64, bool)> = self
             .shots(from)
             .filter_map(|(route, pieces, reverse)| {
+                if !self.in_sight(&pieces) {
+                    return None;
+                }
                 let reached = self.pass(postures, pieces).and(self.goal_postures);
                 (!reached.is_empty()).then(|| (route.cost(TURN_COST, REVERSE_COST), reverse))
             })
@@ -240,16 +254,14 @@ impl<const W: usize> AStar<'_, W> {
         }
     }
 
-    /// Whether the core could pass along a line: a quick look that only ever says no where nothing could pass.
-    fn line_of_sight(&self, from: [f64; 2], to: [f64; 2]) -> bool {
-        let [a, b] = [from, to].map(|p| self.lattice.coordinates(p[0], p[1]));
-        let steps = (a[0] - b[0]).hypot(a[1] - b[1]).ceil().max(1.0);
-        let least = self.options.clearance - 0.75 * self.lattice.step - 0.87 * self.collider.resolution();
-        (0..=steps as usize).all(|k| {
-            let share = k as f64 / steps;
-            let [i, j] = [0, 1].map(|d| (a[d] + share * (b[d] - a[d])).round() as i32);
-            self.lattice.contains(i, j) && f64::from(self.core[self.lattice.index(i, j)]) >= least
-        })
+    /// A quick look along the drives of a shot.
+    fn in_sight(&self, pieces: &[BaseMotion]) -> bool {
+        let mut drives = pieces.iter().filter(|p| p.from.distance(p.to) > 0.0);
+        let Some(first) = drives.next() else { return true };
+        let last = drives.next_back().unwrap_or(first);
+        let clearance = self.options.clearance;
+        let resolution = self.collider.resolution();
+        self.cost_to_go.line_of_sight(self.lattice, self.core_clearances, resolution, clearance, [first.from, last.to])
     }
 
     /// Labels for lattice states near the start, each reached by spin, drive, spin.
@@ -294,18 +306,17 @@ impl<const W: usize> AStar<'_, W> {
         }
     }
 
+    /// Labels for all moves from a state, not yet checked: they carry the postures of their parent.
     fn expand(&self, run: &mut Run<W>, parent: u32, fresh: Bits<W>) {
         let Label { state, cost, .. } = run.labels[parent as usize];
-        let pose = self.lattice.pose(state);
         let turn = std::f64::consts::TAU / HEADINGS as f64;
         for sign in [1, -1] {
             let heading = (state.heading + sign).rem_euclid(HEADINGS as i32);
             let target = LatticeState { heading, ..state };
-            // One key for a spin and its way back: the lower heading, counted around.
-            let lower = if sign > 0 { state } else { target };
-            let motion = BaseMotion { from: pose, to: Pose2 { yaw: pose.yaw + f64::from(sign) * turn, ..pose } };
-            let edge = self.key(lower) * 8;
-            self.step_to(run, parent, fresh, target, cost + TURN_COST * turn, Step::Spin, edge, || vec![motion]);
+            self.offer(
+                run,
+                Label { state: target, parent, cost: cost + TURN_COST * turn, postures: fresh, step: Step::Spin },
+            );
         }
         for reverse in [false, true] {
             if reverse && !self.options.reverse {
@@ -313,55 +324,74 @@ impl<const W: usize> AStar<'_, W> {
             }
             let along =
                 if reverse { (state.heading + HEADINGS as i32 / 2).rem_euclid(HEADINGS as i32) } else { state.heading };
-            for (index, drive) in self.lattice.drives(along).iter().enumerate() {
-                let (i, j) = (state.i + drive.di, state.j + drive.dj);
-                if !self.lattice.contains(i, j) {
-                    continue;
+            for drive in self.lattice.drives(along) {
+                let target = LatticeState { i: state.i + drive.di, j: state.j + drive.dj, ..state };
+                if self.lattice.contains(target.i, target.j) {
+                    let cost = cost + drive.length * if reverse { REVERSE_COST } else { 1.0 };
+                    self.offer(
+                        run,
+                        Label { state: target, parent, cost, postures: fresh, step: Step::Drive { reverse } },
+                    );
                 }
-                let target = LatticeState { i, j, heading: state.heading };
-                let pieces = || {
-                    let mut route = Route::new(pose);
-                    route.drive_to(self.lattice.position(i, j), reverse);
-                    route.end_with(Some(pose.yaw));
-                    route.pieces(Grain::COARSE)
-                };
-                let more = drive.length * if reverse { REVERSE_COST } else { 1.0 };
-                let edge = self.key(state) * 8 + 1 + 2 * index as u64 + u64::from(reverse);
-                self.step_to(run, parent, fresh, target, cost + more, Step::Drive { reverse }, edge, pieces);
             }
         }
     }
 
-    #[allow(clippy::too_many_arguments)] // one private call shape for both kinds of move
-    fn step_to(
-        &self,
-        run: &mut Run<W>,
-        parent: u32,
-        from: Bits<W>,
-        target: LatticeState,
-        cost: f64,
-        step: Step,
-        edge: u64,
-        pieces: impl FnOnce() -> Vec<BaseMotion>,
-    ) {
-        let closed = run.closed.get(&self.key(target)).copied().unwrap_or(Bits::EMPTY);
-        if closed == self.collider.all() {
-            return;
+    /// Pushes a label unless its state is done with.
+    fn offer(&self, run: &mut Run<W>, label: Label<W>) {
+        let closed = run.closed.get(&self.key(label.state)).copied().unwrap_or(Bits::EMPTY);
+        if closed != self.collider.all() {
+            self.push(run, label);
         }
-        let free = *run.moves.entry(edge).or_insert_with(|| {
-            let mut free = self.collider.all();
-            for piece in pieces() {
-                free = free.and(self.collider.free(&piece));
-                if free.is_empty() {
-                    break;
-                }
+    }
+
+    /// Postures that are free all along the move to a label from its parent.
+    fn free_along(&self, run: &mut Run<W>, label: u32) -> Bits<W> {
+        let Label { state, parent, step, .. } = run.labels[label as usize];
+        if parent == NO_PARENT {
+            return self.collider.all();
+        }
+        let from = run.labels[parent as usize].state;
+        let (edge, pieces) = match step {
+            Step::Spin => {
+                // One key for a spin and its way back: the lower heading, counted around.
+                let up = (from.heading + 1).rem_euclid(HEADINGS as i32) == state.heading;
+                let pose = self.lattice.pose(from);
+                let turn = std::f64::consts::TAU / HEADINGS as f64 * if up { 1.0 } else { -1.0 };
+                let motion = BaseMotion { from: pose, to: Pose2 { yaw: pose.yaw + turn, ..pose } };
+                (self.key(if up { from } else { state }) * 8, vec![motion])
             }
-            free
-        });
-        let postures = self.collider.neighbours.flood(from, free);
-        if !postures.minus(closed).is_empty() {
-            self.push(run, Label { state: target, parent, cost, postures, step });
+            Step::Drive { reverse } => {
+                let pose = self.lattice.pose(from);
+                let mut route = Route::new(pose);
+                route.drive_to(self.lattice.position(state.i, state.j), reverse);
+                let mut pieces = route.pieces(Grain::COARSE);
+                if self.strict {
+                    route.end_with(Some(pose.yaw));
+                    pieces = route.pieces(Grain::COARSE);
+                } else {
+                    pieces.retain(|p| p.from.distance(p.to) > 0.0);
+                }
+                let half = if reverse { HEADINGS as i32 / 2 } else { 0 };
+                let drives = self.lattice.drives((from.heading + half).rem_euclid(HEADINGS as i32));
+                let second = drives[0].di != state.i - from.i || drives[0].dj != state.j - from.j;
+                let code = 1 + 2 * u64::from(second) + u64::from(reverse);
+                (self.key(from) * 8 + code, pieces)
+            }
+            Step::Start | Step::Goal { .. } => return self.collider.all(),
+        };
+        if let Some(known) = run.moves.get(&edge) {
+            return *known;
         }
+        let mut free = self.collider.all();
+        for piece in pieces {
+            free = free.and(self.collider.free(&piece));
+            if free.is_empty() {
+                break;
+            }
+        }
+        run.moves.insert(edge, free);
+        free
     }
 
     /// The base's route behind a goal label.
@@ -382,7 +412,7 @@ impl<const W: usize> AStar<'_, W> {
                     route.drive_to(place, false);
                     route.end_with(Some(heading));
                 }
-                Step::Spin => route.end_with(Some(heading)),
+                Step::Spin => route.spin_to(heading),
                 Step::Drive { reverse } => {
                     route.drive_to(place, reverse);
                     route.end_with(Some(heading));

@@ -36,6 +36,8 @@ const TOO_HIGH: f64 = 0.26;
 const TOO_LOW: f64 = 0.8661;
 /// Distances are found to this, m.
 const TOLERANCE: f64 = 2e-4;
+/// ... but where the clearance is kept anyway, to this.
+const LOOSE: f64 = 5e-3;
 
 /// A shape with its place, and balls that cover it.
 struct Placed {
@@ -79,6 +81,13 @@ impl Posed {
 struct Sweep {
     ends: [Posed; 2],
     bulge: f64,
+}
+
+/// Obstacles near a motion.
+struct Near {
+    boxes: Vec<Aabb>,
+    /// Unit normal of the slab that separated the last pair of bodies that were looked at closely.
+    hint: Vector3<f64>,
 }
 
 /// The nearest obstacle of a pose, for people.
@@ -178,15 +187,15 @@ impl<'a, const W: usize> Collider<'a, W> {
         if self.esdf.distance([middle.x, middle.y, self.ball.0]) >= self.ball.1 + half_drive + far {
             return self.all();
         }
-        let mut boxes = None;
+        let mut near = None;
         for placed in &self.rigid {
-            if self.gap(placed, 0, motion, 0.0, &mut boxes).lower < self.clearance {
+            if self.gap(placed, 0, motion, 0.0, &mut near).lower < self.clearance {
                 return Bits::EMPTY;
             }
         }
         let mut free = self.all();
         for placed in &self.moving {
-            free = self.free_postures(placed, motion, free, &mut boxes);
+            free = self.free_postures(placed, motion, free, &mut near);
             if free.is_empty() {
                 break;
             }
@@ -195,13 +204,7 @@ impl<'a, const W: usize> Collider<'a, W> {
     }
 
     /// Those of `alive` in which one moving shape is clear.
-    fn free_postures(
-        &self,
-        placed: &Placed,
-        motion: &BaseMotion,
-        alive: Bits<W>,
-        boxes: &mut Option<Vec<Aabb>>,
-    ) -> Bits<W> {
+    fn free_postures(&self, placed: &Placed, motion: &BaseMotion, alive: Bits<W>, near: &mut Option<Near>) -> Bits<W> {
         let mut open = alive;
         let mut free = Bits::EMPTY;
         let useful = 6.0 * placed.step_moves.iter().fold(0.0f64, |a, b| a.max(*b));
@@ -209,7 +212,7 @@ impl<'a, const W: usize> Collider<'a, W> {
             if !open.contains(posture) {
                 continue;
             }
-            let gap = self.gap(placed, posture, motion, useful, boxes);
+            let gap = self.gap(placed, posture, motion, useful, near);
             let (is_free, margin) = if gap.lower >= self.clearance {
                 (true, gap.lower - self.clearance)
             } else {
@@ -247,7 +250,7 @@ impl<'a, const W: usize> Collider<'a, W> {
         posture: usize,
         motion: &BaseMotion,
         useful: f64,
-        boxes: &mut Option<Vec<Aabb>>,
+        near: &mut Option<Near>,
     ) -> gjk::Gap {
         let pose = &placed.poses[posture];
         let half_turn = 0.5 * motion.turn();
@@ -275,12 +278,12 @@ impl<'a, const W: usize> Collider<'a, W> {
         }
         let ends = [pose.under(motion.from), pose.under(motion.to)];
         let sweep = Sweep { ends, bulge: placed.reach * (1.0 - half_turn.cos()) };
-        let near = boxes.get_or_insert_with(|| self.near(motion));
+        let near = near.get_or_insert_with(|| self.near(motion));
         self.exact_gap(placed, &sweep, near, self.clearance + useful)
     }
 
     /// Obstacles that any part of the robot could come near.
-    fn near(&self, motion: &BaseMotion) -> Vec<Aabb> {
+    fn near(&self, motion: &BaseMotion) -> Near {
         let reach = self.reach() + self.clearance + 0.1;
         let (a, b) = (motion.from, motion.to);
         let region = Aabb {
@@ -289,11 +292,12 @@ impl<'a, const W: usize> Collider<'a, W> {
         };
         let mut boxes = Vec::new();
         obstacles::collect(self.map, &region, &mut boxes);
-        boxes
+        Near { boxes, hint: Vector3::x() }
     }
 
     /// Bounds on the distance of a swept shape to the boxes and the map's edge, as far as `cap`.
-    fn exact_gap(&self, placed: &Placed, sweep: &Sweep, boxes: &[Aabb], cap: f64) -> gjk::Gap {
+    fn exact_gap(&self, placed: &Placed, sweep: &Sweep, near: &mut Near, cap: f64) -> gjk::Gap {
+        let Near { boxes, hint } = near;
         let bounds = sweep_bounds(placed, sweep);
         let mut gap = gjk::Gap { lower: cap, upper: f64::INFINITY };
         if self.map.outside == Unknown::Occupied {
@@ -303,7 +307,7 @@ impl<'a, const W: usize> Collider<'a, W> {
         let [a, b] = &sweep.ends;
         let drive = (a.rotation == b.rotation)
             .then(|| (a.rotation, 0.5 * (a.centre + b.centre), a.rotation.tr_mul(&(b.centre - a.centre))));
-        for obstacle in boxes {
+        for obstacle in boxes.iter() {
             let reached = gap.lower + sweep.bulge;
             if box_gap(&bounds, obstacle) >= reached {
                 continue;
@@ -319,8 +323,21 @@ impl<'a, const W: usize> Collider<'a, W> {
                 let far = if p.dot(d) >= q.dot(d) { p } else { q };
                 far - Vector3::from_fn(|i, _| if d[i] > 0.0 { obstacle.min[i] } else { obstacle.max[i] })
             };
+            // What separated the last pair often separates this one.
+            if hint.dot(&support(&-*hint)) >= reached {
+                continue;
+            }
             let middle = Vector3::from_fn(|i, _| 0.5 * (obstacle.min[i] + obstacle.max[i]));
-            let found = gjk::distance_from_origin(support, a.centre - middle, None, TOLERANCE);
+            let least = self.clearance;
+            let enough = |found: gjk::Gap| {
+                found.lower >= reached
+                    || found.upper < least
+                    || found.upper - found.lower <= if found.lower - sweep.bulge >= least { LOOSE } else { TOLERANCE }
+            };
+            let (found, direction) = gjk::with_direction(support, a.centre - middle, enough);
+            if found.upper > 0.0 {
+                *hint = direction / found.upper;
+            }
             gap.lower = gap.lower.min(found.lower - sweep.bulge);
             gap.upper = gap.upper.min(found.upper);
             if gap.upper < self.clearance {
@@ -358,7 +375,8 @@ impl<'a, const W: usize> Collider<'a, W> {
                         - Vector3::from_fn(|i, _| if d[i] > 0.0 { obstacle.min[i] } else { obstacle.max[i] })
                 };
                 let middle = Vector3::from_fn(|i, _| 0.5 * (obstacle.min[i] + obstacle.max[i]));
-                let gap = gjk::distance_from_origin(apart, posed.centre - middle, None, 1e-6);
+                let precise = |gap: gjk::Gap| gap.upper - gap.lower <= 1e-6;
+                let gap = gjk::distance_from_origin(apart, posed.centre - middle, precise);
                 let clearance = if gap.upper > 0.0 { gap.upper } else { -overlap(apart, &posed.rotation) };
                 take(clearance, Some(*obstacle));
             }

@@ -1,75 +1,138 @@
-//! Cost to go in the plane: the least distance to the goal of a ball about the base's axis that the robot holds inside, over
-//! the lattice positions. A lower bound but for the eight directions; only guides, except where a position is shut off.
+//! Cost to go in the plane: the least distance that the centre of a disc, which the robot holds inside in every posture, must
+//! travel to where it is at the goal. Driving and spinning move the centre no farther than they cost, so it is a lower bound
+//! but for the eight directions; where it says that a position is shut off, no motion of the robot gets there.
 
 use super::lattice::Lattice;
-use crate::esdf::Esdf;
-use crate::robot::RobotModel;
+use crate::esdf;
+use crate::geom::Pose2;
+use crate::map::VoxelMap;
+use crate::robot::{Convex, RobotModel};
+
+/// A disc inside one of the robot's rigid shapes at every height of a range: an obstacle at such a height must keep off it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Core {
+    /// Centre in the base frame, m.
+    pub offset: [f64; 2],
+    /// m.
+    pub radius: f64,
+    /// Heights, m.
+    pub heights: [f64; 2],
+}
+
+impl Core {
+    /// The largest such disc among upright boxes, upright cylinders and spheres; else a point of the first rigid shape.
+    pub fn new(robot: &RobotModel) -> Self {
+        let mut best: Option<Self> = None;
+        for shape in robot.shapes.iter().filter(|s| s.body == 0) {
+            let pose = robot.bodies[0].origin * shape.pose;
+            let centre = pose.translation.vector;
+            let up = pose.rotation * nalgebra::Vector3::z();
+            let upright = up.z.abs() > 1.0 - 1e-9;
+            let (radius, half_height) = match &shape.convex {
+                Convex::Box { half } if upright => (half[0].min(half[1]), half[2]),
+                Convex::Cylinder { radius, half_length } if upright => (*radius, *half_length),
+                // At its widest; a sphere's own height range shrinks with the disc.
+                Convex::Sphere { radius } => (0.9 * radius, 0.4 * radius),
+                _ => (0.0, 0.0),
+            };
+            let core = Self {
+                offset: [centre.x, centre.y],
+                radius,
+                heights: [centre.z - half_height, centre.z + half_height],
+            };
+            if best.is_none_or(|b| core.radius > b.radius) {
+                best = Some(core);
+            }
+        }
+        best.unwrap_or(Self { offset: [0.0; 2], radius: 0.0, heights: [0.1, 0.1] })
+    }
+
+    /// Where the centre is in a pose.
+    pub fn centre(&self, pose: Pose2) -> [f64; 2] {
+        let (sin, cos) = pose.yaw.sin_cos();
+        let [x, y] = self.offset;
+        [pose.x + cos * x - sin * y, pose.y + sin * x + cos * y]
+    }
+}
+
+/// Clearance of the core with its centre at each lattice position, m; exact at the map's nodes.
+pub(super) fn core_clearance(lattice: &Lattice, map: &VoxelMap, core: &Core) -> Vec<f32> {
+    let flat = esdf::build(&flattened(map, core.heights));
+    let mut out = Vec::with_capacity(lattice.size[0] as usize * lattice.size[1] as usize);
+    for i in 0..lattice.size[0] {
+        for j in 0..lattice.size[1] {
+            let [x, y] = lattice.position(i, j);
+            out.push((flat.distance([x, y, 0.0]) - core.radius) as f32);
+        }
+    }
+    out
+}
+
+/// One layer of cells: occupied where a cell of the column meets the heights.
+fn flattened(map: &VoxelMap, heights: [f64; 2]) -> VoxelMap {
+    let mut flat =
+        VoxelMap::new(map.resolution, [map.origin[0], map.origin[1], 0.0], [map.dims[0], map.dims[1], 1], map.outside);
+    let cell = |z: f64| (z - map.origin[2]) / map.resolution;
+    // A cell that only touches the range from above or below is not beside the disc.
+    let first = (cell(heights[0]) + 1e-6).floor().max(0.0) as usize;
+    let end = ((cell(heights[1]) - 1e-6).ceil().max(0.0) as usize).min(map.dims[2]);
+    for i in 0..map.dims[0] {
+        for j in 0..map.dims[1] {
+            let column = map.column(i, j);
+            if (first..end).any(|k| column[k / 64] >> (k % 64) & 1 == 1) {
+                flat.occupy([i, j, 0]);
+            }
+        }
+    }
+    flat
+}
 
 /// Distances to the goal in lattice steps.
 pub(super) struct CostToGo {
     /// By lattice index, in tenths of a step; `u32::MAX`: shut off.
     tenths: Vec<u32>,
     step: f64,
-}
-
-/// The largest ball about the base's axis inside one of the robot's rigid boxes, sampled: (height of the centre, radius) m.
-pub(super) fn core_ball(robot: &RobotModel) -> (f64, f64) {
-    use crate::robot::Convex;
-    let mut best = (0.1, 0.0f64);
-    for shape in robot.shapes.iter().filter(|s| s.body == 0) {
-        if matches!(shape.convex, Convex::Hull { .. }) {
-            continue;
-        }
-        let pose = robot.bodies[0].origin * shape.pose;
-        let half = shape.convex.half_extents();
-        for k in 1..40 {
-            let z = 0.025 * f64::from(k);
-            let local = pose.inverse_transform_point(&nalgebra::Point3::new(0.0, 0.0, z));
-            let flat = local.x.hypot(local.y);
-            let radius = match &shape.convex {
-                Convex::Sphere { radius } => radius - local.coords.norm(),
-                Convex::Cylinder { radius, half_length } => (radius - flat).min(half_length - local.z.abs()),
-                _ => (0..3).map(|a| half[a] - local[a].abs()).fold(f64::INFINITY, f64::min),
-            };
-            if radius > best.1 {
-                best = (z, radius);
-            }
-        }
-    }
-    best
-}
-
-/// Clearance that the core ball has at each lattice position, m.
-pub(super) fn core_clearance(lattice: &Lattice, esdf: &Esdf, (height, radius): (f64, f64)) -> Vec<f32> {
-    let mut out = Vec::with_capacity((lattice.size[0] * lattice.size[1]) as usize);
-    for i in 0..lattice.size[0] {
-        for j in 0..lattice.size[1] {
-            let [x, y] = lattice.position(i, j);
-            out.push((esdf.distance([x, y, height]) - radius) as f32);
-        }
-    }
-    out
+    core: Core,
 }
 
 const NEIGHBOURS: [(i32, i32, u32); 8] =
     [(1, 0, 10), (0, 1, 10), (-1, 0, 10), (0, -1, 10), (1, 1, 14), (1, -1, 14), (-1, 1, 14), (-1, -1, 14)];
 
+/// Least clearance of the core, as interpolated at a lattice position, with which its centre may pass within 0.71 steps.
+fn least_clearance(lattice: &Lattice, resolution: f64, clearance: f64) -> f32 {
+    let on_nodes = (lattice.step / resolution + 1e-6).fract() < 2e-6;
+    let slack = 0.71 * lattice.step + if on_nodes { 0.0 } else { 0.87 * resolution };
+    (clearance - slack) as f32 - 1e-5
+}
+
 impl CostToGo {
-    /// Distances from everywhere to `goal` (m) where the core keeps `clearance`.
-    pub fn new(lattice: &Lattice, core: &[f32], resolution: f64, clearance: f64, goal: [f64; 2]) -> Self {
-        // A drive passes within 0.71 steps of lattice positions, and interpolation is off by 0.87 cells between nodes.
-        let on_nodes = (lattice.step / resolution).fract() < 1e-6;
-        let slack = 0.71 * lattice.step + if on_nodes { 0.0 } else { 0.87 * resolution };
-        let least = (clearance - slack) as f32;
-        let mut tenths = vec![u32::MAX; core.len()];
+    /// Distances of the core's centre from everywhere to where it is at the goal, through where it keeps `clearance`.
+    /// `goal_yaw`: `None`, any.
+    pub fn new(
+        lattice: &Lattice,
+        core: (Core, &[f32]),
+        resolution: f64,
+        clearance: f64,
+        goal: Pose2,
+        goal_yaw: Option<f64>,
+    ) -> Self {
+        let (core, clearances) = core;
+        let least = least_clearance(lattice, resolution, clearance);
+        let mut tenths = vec![u32::MAX; clearances.len()];
         // Dial's buckets: all steps are 10 or 14.
         let mut buckets: [Vec<(i32, i32)>; 16] = Default::default();
-        let at = lattice.coordinates(goal[0], goal[1]);
-        for i in at[0].floor() as i32..=at[0].ceil() as i32 {
-            for j in at[1].floor() as i32..=at[1].ceil() as i32 {
-                if lattice.contains(i, j) {
-                    tenths[lattice.index(i, j)] = 0;
-                    buckets[0].push((i, j));
+        // Lattice positions around the centre at the goal; around the whole circle of them where any heading will do.
+        let turns = if goal_yaw.is_some() { 1 } else { 72 };
+        for k in 0..turns {
+            let yaw = goal_yaw.unwrap_or(std::f64::consts::TAU * f64::from(k) / f64::from(turns));
+            let centre = core.centre(Pose2 { yaw, ..goal });
+            let at = lattice.coordinates(centre[0], centre[1]);
+            for i in at[0].floor() as i32..=at[0].ceil() as i32 {
+                for j in at[1].floor() as i32..=at[1].ceil() as i32 {
+                    if lattice.contains(i, j) && tenths[lattice.index(i, j)] != 0 {
+                        tenths[lattice.index(i, j)] = 0;
+                        buckets[0].push((i, j));
+                    }
                 }
             }
         }
@@ -92,19 +155,46 @@ impl CostToGo {
                 }
                 let index = lattice.index(i, j);
                 let next = distance + cost;
-                if next < tenths[index] && core[index] >= least {
+                if next < tenths[index] && clearances[index] >= least {
                     tenths[index] = next;
                     buckets[next as usize % 16].push((i, j));
                 }
             }
         }
-        Self { tenths, step: lattice.step }
+        Self { tenths, step: lattice.step, core }
     }
 
     /// m; `None`: shut off.
-    pub fn at(&self, lattice: &Lattice, i: i32, j: i32) -> Option<f64> {
+    pub fn at(&self, lattice: &Lattice, pose: Pose2) -> Option<f64> {
+        let centre = self.core.centre(pose);
+        let [i, j] = lattice.coordinates(centre[0], centre[1]).map(|v| v.round() as i32);
+        if !lattice.contains(i, j) {
+            return None;
+        }
         let tenths = self.tenths[lattice.index(i, j)];
         (tenths != u32::MAX).then(|| f64::from(tenths) * 0.1 * self.step)
+    }
+
+    /// Whether the core could pass while the base drives straight: a quick look that only says no where nothing passes.
+    pub fn line_of_sight(
+        &self,
+        lattice: &Lattice,
+        clearances: &[f32],
+        resolution: f64,
+        clearance: f64,
+        [from, to]: [Pose2; 2],
+    ) -> bool {
+        let [a, b] = [from, to].map(|pose| {
+            let centre = self.core.centre(pose);
+            lattice.coordinates(centre[0], centre[1])
+        });
+        let steps = (a[0] - b[0]).hypot(a[1] - b[1]).ceil().max(1.0);
+        let least = least_clearance(lattice, resolution, clearance);
+        (0..=steps as usize).all(|k| {
+            let share = k as f64 / steps;
+            let [i, j] = [0, 1].map(|d| (a[d] + share * (b[d] - a[d])).round() as i32);
+            lattice.contains(i, j) && clearances[lattice.index(i, j)] >= least
+        })
     }
 }
 

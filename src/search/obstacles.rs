@@ -20,8 +20,12 @@ pub(super) fn collect(map: &VoxelMap, region: &Aabb, out: &mut Vec<Aabb>) {
     for i in xs {
         open.clear();
         for j in ys.clone() {
+            let column = map.column(i, j);
+            if open.is_empty() && column.iter().all(|word| *word == 0) {
+                continue;
+            }
             next.clear();
-            for_each_run(map.column(i, j), zs.clone(), |low, high| {
+            for_each_run(column, zs.clone(), |low, high| {
                 let since = open.iter().find(|r| r.low == low && r.high == high).map_or(j, |r| r.since);
                 next.push(OpenRun { low, high, since });
             });

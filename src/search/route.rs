@@ -60,6 +60,20 @@ impl Route {
         self.reverse.push(reverse);
     }
 
+    /// Turns to a heading, the shorter way; what was turned so far stays a turn of its own where this one goes back: the
+    /// joints may have moved there, where there is room.
+    pub fn spin_to(&mut self, yaw: f64) {
+        const SMALL: f64 = 0.05;
+        let last = self.turns.len() - 1;
+        let turn = wrap_angle(yaw - self.end_yaw());
+        if self.turns[last].abs() > SMALL && self.turns[last] * turn < 0.0 {
+            self.corners.push(self.corners[last]);
+            self.turns.push(0.0);
+            self.reverse.push(false);
+        }
+        self.end_with(Some(yaw));
+    }
+
     /// Turns to a heading, the shorter way.
     pub fn end_with(&mut self, yaw: Option<f64>) {
         if let Some(yaw) = yaw {
