@@ -11,14 +11,17 @@ use crate::emit::csv::{self, CsvHeader};
 use crate::emit::mcap_read;
 use crate::pipeline::{self, Inputs};
 
-/// Check a command file against its robot, map and limits, without planning anything.
+/// Check a command file against its robot, map, limits and goal, without planning anything.
 ///
-/// Exit 0: everything holds. 1: it does not. 2: bad input.
+/// Proves of the commands as written what `compile` proves: clearance, limits of wheels and joints, and the end point. The file may
+/// come from anywhere.
+///
+/// Exit 0: everything holds. 1: it does not. 2: bad input or usage.
 #[derive(Debug, clap::Args)]
 pub struct CheckArgs {
     /// Command file to check (.csv or .mcap).
     commands: PathBuf,
-    /// Mission that names the robot, the map and the limits [default: the one that the file names].
+    /// Mission that names the robot, the map, the limits and the goal [default: the one that the file names].
     #[arg(long, value_name = "MISSION.yaml")]
     mission: Option<PathBuf>,
     /// Print the verdict as JSON.

@@ -13,20 +13,23 @@ use crate::report::{PathErrorRow, summary};
 
 /// Compile one mission into certified command files.
 ///
-/// Writes OUT/MISSION/: commands.csv, commands.mcap, path_error.csv, report.json, commands.d and timings.json, all or none.
-/// Exit 0: certified. 1: no trajectory or no certificate (report.json says why, older command files are removed). 2: bad input.
+/// Writes commands.csv, commands.mcap, path_error.csv, report.json, commands.d and timings.json into DIR/<mission's name>/, all or
+/// none, and prints a summary.
+///
+/// Exit 0: certified. 1: no trajectory or no certificate; report.json says why. 2: bad input or usage. After 1 and 2 no command file
+/// of this mission is left, not even an older one.
 #[derive(Debug, clap::Args)]
 pub struct CompileArgs {
-    /// The mission file.
+    /// The mission file. Its stem is the mission's name.
     #[arg(value_name = "MISSION.yaml")]
     mission: PathBuf,
-    /// Folder for the outputs.
+    /// Folder that gets a folder for each mission.
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
-    /// Hold each command this long, instead of the mission's sampling_time_s (seconds).
+    /// Seconds each command is held, instead of the mission's sampling_time_s.
     #[arg(long, value_name = "S", value_parser = seconds)]
     sampling_time: Option<f64>,
-    /// Command files to write.
+    /// Command files to write, separated by commas.
     #[arg(long, value_name = "FORMAT", value_delimiter = ',', default_value = "csv,mcap")]
     format: Vec<Format>,
     /// Print report.json on stdout instead of the summary.

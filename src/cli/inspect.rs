@@ -15,12 +15,12 @@ use crate::robot::{self, RobotInputs};
 /// Print what the program understood of a URDF, robot.yaml, map, mission or command file.
 #[derive(Debug, clap::Args)]
 pub struct InspectArgs {
-    /// .urdf, robot.yaml, a mission, a map, commands.csv or commands.mcap.
+    /// A .urdf, robot.yaml, mission, map, commands.csv or commands.mcap.
     file: PathBuf,
-    /// Cell size of point clouds, in metres.
+    /// Cell size in metres, for a point cloud.
     #[arg(long, value_name = "M", default_value_t = 0.05)]
     resolution: f64,
-    /// Slab of a map that holds obstacles, in metres.
+    /// Heights in metres between which a map's points are obstacles: two numbers, the lower first.
     #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 2, default_values_t = [0.02, 2.0])]
     height: Vec<f64>,
 }

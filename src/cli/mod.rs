@@ -16,14 +16,17 @@ use clap::{CommandFactory, Parser, Subcommand};
 use crate::diag::{Diagnostics, Severity};
 use terminal::Terminal;
 
-/// The motion compiler for robots that change shape.
+/// Offline trajectory compiler for differential-drive robots that change shape.
 ///
-/// Reads a robot (URDF: a differential-drive base and shape-changing joints), a map and a mission, and writes an executable motion
-/// file with a certificate: proven clearance, wheel and joint limits, and end point of the commands as written.
+/// Reads a mission (a robot's URDF, a map, a start and a goal) and writes a file of wheel and joint commands with a certificate:
+/// the commands as written are proven to keep clearance and all limits, and to end at the goal.
+///
+/// Results go to stdout, diagnostics to stderr. Exit codes: 0 done and certified, 1 no trajectory or no certificate, 2 bad input or
+/// usage.
 #[derive(Debug, Parser)]
 #[command(name = "trajc", version, propagate_version = true, max_term_width = 100)]
 struct Args {
-    /// No progress on the terminal.
+    /// Show no progress; results and diagnostics are printed all the same.
     #[arg(long, short, global = true)]
     quiet: bool,
     #[command(subcommand)]
@@ -37,7 +40,7 @@ enum Command {
     PathError(path_error::PathErrorArgs),
     Inspect(inspect::InspectArgs),
     Schema(schema::SchemaArgs),
-    /// Print the completion script of a shell.
+    /// Print a shell's completion script, such as for `source <(trajc completions bash)`.
     Completions {
         /// Which shell.
         shell: clap_complete::Shell,

@@ -11,21 +11,24 @@ use crate::emit::csv;
 use crate::pipeline::{self, CompileOptions};
 use crate::report::PathErrorRow;
 
-/// How far held commands leave the planned path, against the sampling time.
+/// Measure how far held commands leave the path, against the sampling time.
 ///
-/// Of a mission: compiles it and samples its motion at each time. Of a command file: measures the file as it is written against
-/// the mission's path (or its own planned poses), and with --sampling-times also what its mission would give.
+/// Of a mission: compiles it and samples its motion at each time; writes no file. Of a command file: measures the file as it is
+/// written against its mission's given path, or its own planned poses where the path was planned; with --sampling-times it also
+/// compiles the mission.
+///
+/// Exit 0: measured. 1: the mission has no certified motion. 2: bad input or usage.
 #[derive(Debug, clap::Args)]
 pub struct PathErrorArgs {
     /// A mission (.yaml) or a command file (.csv, .mcap).
     file: PathBuf,
-    /// Sampling times, in seconds [default: the mission's].
+    /// Sampling times in seconds, separated by commas [default: the mission's].
     #[arg(long, value_name = "S", value_delimiter = ',', value_parser = seconds)]
     sampling_times: Vec<f64>,
-    /// Print CSV.
+    /// Print CSV, as in path_error.csv.
     #[arg(long)]
     csv: bool,
-    /// Print JSON.
+    /// Print JSON, as in report.json.
     #[arg(long, conflicts_with = "csv")]
     json: bool,
 }

@@ -6,7 +6,7 @@ use super::terminal::Terminal;
 use crate::diag::Diagnostics;
 use crate::{mission, report, robot};
 
-/// Print the JSON Schema of a file format, for editors and validators.
+/// Print the JSON Schema of a file format (draft 2020-12), for editors and validators.
 #[derive(Debug, clap::Args)]
 pub struct SchemaArgs {
     /// Which file.
