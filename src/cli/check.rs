@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::inputs::{self, Disk, folder_of, tidy};
 use super::terminal::Terminal;
-use crate::certify::{Certificate, END_ANGLE_TOLERANCE, END_POINT_TOLERANCE};
+use crate::certify::{Certificate, END_ANGLE_TOLERANCE, END_POINT_TOLERANCE, Refusal, RefusalKind};
 use crate::command::CommandTable;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::emit::csv::{self, CsvHeader};
@@ -33,20 +33,28 @@ pub struct CheckArgs {
 pub(super) struct CommandFile {
     pub table: CommandTable,
     pub header: CsvHeader,
+    /// Where twists contradict the wheels.
+    contradictions: Vec<Diagnostic>,
 }
 
 /// Reads a command file by its ending.
 pub(super) fn read_commands(path: &Path) -> Result<CommandFile, Diagnostics> {
+    let file = read_to_judge(path)?;
+    if file.contradictions.is_empty() { Ok(file) } else { Err(Diagnostics(file.contradictions)) }
+}
+
+/// The same, with rows that contradict themselves: they are part of the verdict.
+fn read_to_judge(path: &Path) -> Result<CommandFile, Diagnostics> {
     let disk = Disk::default();
     let name = path.display().to_string();
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
         let bytes = disk.binary(path, None)?;
         let file = mcap_read::read(&name, &bytes)?;
-        return Ok(CommandFile { table: file.table, header: file.header });
+        return Ok(CommandFile { table: file.table, header: file.header, contradictions: Vec::new() });
     }
     let text = disk.text(path, None)?;
-    let (table, header) = csv::read(&name, &text.text)?;
-    Ok(CommandFile { table, header })
+    let (table, header, contradictions) = csv::read_to_judge(&name, &text.text)?;
+    Ok(CommandFile { table, header, contradictions })
 }
 
 /// The mission of a command file: named on the command line, or by the file.
@@ -75,13 +83,21 @@ pub(super) fn mission_of(
 /// # Errors
 /// Bad input.
 pub fn check(args: &CheckArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics> {
-    let file = read_commands(&args.commands)?;
+    let file = read_to_judge(&args.commands)?;
     let (mut inputs, disk) = mission_of(&args.commands, &file.header, args.mission.as_deref())?;
-    let certificate = pipeline::check(&mut inputs, &file.table)?;
+    let mut certificate = pipeline::check(&mut inputs, &file.table)?;
+    certificate.refusals.extend(file.contradictions.iter().map(contradiction));
     let changed = disk.hash() != file.header.inputs_blake3;
     let text = if args.json { json(&certificate, changed) } else { readable(args, &certificate, changed) };
     terminal.print(&text);
     Ok(u8::from(!certificate.holds()))
+}
+
+/// A row's own contradiction as a reason to refuse.
+fn contradiction(fault: &Diagnostic) -> Refusal {
+    let line = fault.at.as_ref().map(|at| at.source.text[..at.range.start].matches('\n').count() + 1);
+    let message = line.map_or(fault.message.clone(), |line| format!("line {line}: {}", fault.message));
+    Refusal { kind: RefusalKind::Table, message, time: None }
 }
 
 fn json(certificate: &Certificate, changed: bool) -> String {

@@ -64,7 +64,9 @@ pub fn compile(args: &CompileArgs, terminal: &mut Terminal) -> Result<u8, Diagno
         Ok(code) => Ok(code),
         Err(mut diagnostics) => {
             if let Err(error) = output::discard(&args.out, &name) {
-                diagnostics.0.extend(Diagnostics::from(error).0);
+                // The reason why nothing could be written may be told already.
+                let more = Diagnostics::from(error).0.into_iter().filter(|d| !diagnostics.0.contains(d));
+                diagnostics.0.extend(more.collect::<Vec<_>>());
             }
             Err(diagnostics)
         }

@@ -195,7 +195,10 @@ pub fn read_map_file(path: &Path, disk: &Disk, named_by: Option<&crate::diag::Sp
         Some((other, required)) => {
             let other = tidy(&other);
             if required || other.is_file() {
-                let bytes = disk.binary(&other, None)?;
+                let bytes = disk.binary(&other, None).map_err(|Diagnostics(faults)| {
+                    let named_by = format!("`{name}` names it; paths are relative to that file");
+                    Diagnostics(faults.into_iter().map(|fault| fault.hint(&named_by)).collect())
+                })?;
                 Some((other.display().to_string(), bytes))
             } else {
                 None

@@ -41,7 +41,9 @@ pub enum OutputError {
 impl Describe for OutputError {
     fn diagnostic(&self) -> Diagnostic {
         match self {
-            Self::Io { .. } => Diagnostic::error("output/io", self),
+            Self::Io { .. } => {
+                Diagnostic::error("output/io", self).hint("choose a folder that can be written with `--out DIR`")
+            }
             Self::Name(_) => Diagnostic::error("output/name", self).hint("rename the mission's file"),
             Self::NotAFolder(_) => {
                 Diagnostic::error("output/not-a-folder", self).hint("move it away or choose another `--out`")

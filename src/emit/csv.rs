@@ -9,7 +9,7 @@
 //! 0,1.5,1.5,0.12,0,0,0.1,0.5,0.5,0
 //! ```
 
-pub use super::csv_read::read;
+pub use super::csv_read::{read, read_to_judge};
 use super::number;
 use crate::command::CommandTable;
 use crate::report::{PathErrorRow, names};

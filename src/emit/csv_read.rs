@@ -39,11 +39,25 @@ const KEYS: [&str; 9] = [
 /// too few or too many cells; cells that are no finite number; times that do not increase or are not multiples of the
 /// sampling time; `v_mps` or `omega_rad_s` that contradict the wheels.
 pub fn read(name: &str, text: &str) -> Result<(CommandTable, CsvHeader), Diagnostics> {
+    let (table, header, contradictions) = read_to_judge(name, text)?;
+    if contradictions.is_empty() { Ok((table, header)) } else { Err(Diagnostics(contradictions)) }
+}
+
+/// As [`read`], but rows whose `v_mps` or `omega_rad_s` contradict their wheels are told beside, for who judges the wheels.
+///
+/// # Errors
+/// All others of [`read`].
+pub fn read_to_judge(name: &str, text: &str) -> Result<(CommandTable, CsvHeader, Vec<Diagnostic>), Diagnostics> {
     let source = Arc::new(Source { name: name.to_string(), text: text.to_string() });
-    let mut reader = Reader { lines: lines(&source.text), source: &source, faults: Vec::new() };
+    let lines = lines(&source.text);
+    let mut reader = Reader { lines, source: &source, faults: Vec::new(), contradictions: Vec::new() };
     match reader.read() {
-        Some(found) if reader.faults.is_empty() => Ok(found),
-        _ => Err(Diagnostics(reader.faults)),
+        Some((table, header)) if reader.faults.is_empty() => Ok((table, header, reader.contradictions)),
+        _ => {
+            reader.faults.extend(reader.contradictions);
+            reader.faults.truncate(FAULTS);
+            Err(Diagnostics(reader.faults))
+        }
     }
 }
 
@@ -65,6 +79,7 @@ struct Reader<'a> {
     source: &'a Arc<Source>,
     lines: Vec<Range<usize>>,
     faults: Vec<Diagnostic>,
+    contradictions: Vec<Diagnostic>,
 }
 
 /// Values of the head.
@@ -108,6 +123,10 @@ impl Reader<'_> {
     }
 
     fn read(&mut self) -> Option<(CommandTable, CsvHeader)> {
+        if self.lines.is_empty() {
+            self.fault("commands/empty", "the file is empty".into(), 0..0);
+            return None;
+        }
         let notes = self.lines.iter().take_while(|l| self.text(l).starts_with('#')).count();
         let head = self.head(notes);
         let Some(names) = self.lines.get(notes).cloned() else {
@@ -126,16 +145,18 @@ impl Reader<'_> {
             rows: Vec::with_capacity(self.lines.len() - notes - 1),
         };
         let mut last = f64::NEG_INFINITY;
+        let before = self.faults.len();
         for i in notes + 1..self.lines.len() {
             let cells = self.cells(i, columns.count);
             if self.faults.len() >= FAULTS {
                 break;
             }
-            if let Some(cells) = cells {
+            // Behind a row that cannot be read, all times would seem to be wrong.
+            if let Some(cells) = cells.filter(|_| self.faults.len() == before) {
                 self.row(i, &cells, &columns, &mut table, &mut last);
             }
         }
-        if table.rows.is_empty() {
+        if table.rows.is_empty() && self.faults.len() == before {
             let end = self.source.text.len();
             self.fault("commands/no-rows", "the file has no row".into(), end..end);
         }
@@ -257,7 +278,10 @@ impl Reader<'_> {
         }
         let fixed = FIXED.map(|name| {
             names.iter().position(|n| n == name).unwrap_or_else(|| {
-                self.fault("commands/column", format!("no column `{name}`"), range.clone());
+                // An unknown column that is near to it was told with that hint; once is enough.
+                if !names.iter().any(|n| !FIXED.contains(&n.as_str()) && nearest(n, FIXED) == Some(name)) {
+                    self.fault("commands/column", format!("no column `{name}`"), range.clone());
+                }
                 0
             })
         });
@@ -334,9 +358,13 @@ impl Reader<'_> {
         let (held_v, held_omega) = table.twist(k);
         for (name, said, held) in [("v_mps", v, held_v), ("omega_rad_s", omega, held_omega)] {
             let agree = (said - held).abs() <= TWIST_TOLERANCE * held.abs().max(1.0);
-            if !agree {
-                let message = format!("{name} is {said}, but the wheels of this row give {held}");
-                self.fault("commands/contradiction", message, range.clone());
+            if !agree && self.contradictions.len() < FAULTS {
+                let message = format!(
+                    "{name} is {said}, but the wheels of this row (wheel_left_rad_s {left}, wheel_right_rad_s {right}) give {held}"
+                );
+                let fault =
+                    Diagnostic::error("commands/contradiction", message).at(&Span::new(self.source, range.clone()));
+                self.contradictions.push(fault.hint("the wheels are what is driven; twists must follow from them"));
             }
         }
     }

@@ -72,7 +72,7 @@ pub(super) enum MapError {
     #[error("no points: the file has {points}, of which {not_finite} are not finite")]
     NoPoints { points: usize, not_finite: usize },
     /// Coordinates that cannot be metres on a floor.
-    #[error("coordinates reach {value} m along {axis}: farther than {limit} m from the origin")]
+    #[error("coordinates reach {value:e} m along {axis}: farther than {limit} m from the origin")]
     FarAway { value: f64, axis: char, limit: f64 },
     /// The grid would not fit in memory.
     #[error("the grid would have {} x {} x {} cells of {resolution} m: more than can be handled", dims[0], dims[1], dims[2])]
@@ -128,6 +128,17 @@ pub(super) enum MapError {
     /// A pixel lighter than white.
     #[error("pixel {index} is {value}, above the image's own maximum {max}")]
     Pixel { index: usize, value: u64, max: u32 },
+}
+
+impl MapError {
+    /// Whether it can only be about an occupancy map's image, where there is one.
+    pub(super) fn is_of_pixels(&self) -> bool {
+        use MapError::*;
+        matches!(
+            self,
+            NotPgm { .. } | PgmHeader { .. } | Pixel { .. } | Truncated { .. } | Surplus { .. } | RowsDiffer { .. }
+        )
+    }
 }
 
 impl Describe for MapError {

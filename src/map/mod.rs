@@ -153,7 +153,9 @@ fn ending(name: &str) -> String {
 /// Unreadable map_server YAML.
 pub fn beside(name: &str, bytes: &[u8]) -> Result<Option<(PathBuf, bool)>, Diagnostics> {
     match ending(name).as_str() {
-        ".yaml" | ".yml" => Ok(Some((occupancy::image(name, bytes).map_err(|faults| in_file(name, faults))?, true))),
+        ".yaml" | ".yml" => {
+            Ok(Some((occupancy::image(name, bytes).map_err(|faults| in_file(name, None, faults))?, true)))
+        }
         ".npy" if npy::axes(bytes) == Some(3) => Ok(Some((Path::new(name).with_extension("json"), false))),
         _ => Ok(None),
     }
@@ -167,14 +169,16 @@ pub fn beside(name: &str, bytes: &[u8]) -> Result<Option<(PathBuf, bool)>, Diagn
 /// All faults found: unknown format, lies in headers, truncated data, resolution that differs from the grid's own, no points.
 /// All are bad input (exit 2); what is wrong in a header or in YAML has its place there, all others name the file.
 pub fn parse(inputs: &MapInputs<'_>, spec: &MapSpec, robot_height: f64) -> Result<VoxelMap, Diagnostics> {
-    read(inputs, spec, robot_height).map_err(|faults| in_file(inputs.name, faults))
+    read(inputs, spec, robot_height).map_err(|faults| in_file(inputs.name, inputs.beside.map(|(name, _)| name), faults))
 }
 
-/// Diagnostics of a file's faults: where no text can be quoted, the file is named.
-fn in_file(name: &str, faults: Vec<MapError>) -> Diagnostics {
+/// Diagnostics of a file's faults: where no text can be quoted, the file is named, or the image that the file names.
+fn in_file(name: &str, beside: Option<&str>, faults: Vec<MapError>) -> Diagnostics {
+    let image = beside.filter(|_| [".yaml", ".yml"].contains(&ending(name).as_str()));
     let named = |fault: &MapError| {
         let diagnostic = fault.diagnostic();
-        if diagnostic.at.is_some() { diagnostic } else { diagnostic.file(name) }
+        let about = if fault.is_of_pixels() { image } else { None };
+        if diagnostic.at.is_some() { diagnostic } else { diagnostic.file(about.unwrap_or(name)) }
     };
     Diagnostics(faults.iter().map(named).collect())
 }

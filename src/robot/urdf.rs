@@ -320,7 +320,8 @@ impl Check<'_> {
             Ok(v) if v.len() == count && v.iter().all(|v| v.is_finite() && v.abs() <= 1e9) => Some(v),
             _ => {
                 let what = if count == 1 { "one finite number".into() } else { format!("{count} finite numbers") };
-                let message = format!("{key}=\"{}\": expected {what}", attribute.value());
+                let xacro = if attribute.value().contains("${") { "; a xacro file? Expand it first" } else { "" };
+                let message = format!("{key}=\"{}\": expected {what}{xacro}", attribute.value());
                 self.fault("robot/not-a-number", message, &self.attribute_span(&attribute));
                 None
             }

@@ -48,7 +48,10 @@ impl Table {
         };
         let columns = read_header(&header, robot, &mut errors);
         for (index, column) in ["x_m", "y_m"].into_iter().enumerate() {
-            if !columns.contains(&Column::Plane(index)) {
+            // An unknown column that is near to it was told with that hint; once is enough.
+            let meant = |title: &String| nearest(title, ["x_m", "y_m"]) == Some(column);
+            let told = header.texts.iter().zip(&columns).any(|(title, c)| *c == Column::Unknown && meant(title));
+            if !columns.contains(&Column::Plane(index)) && !told {
                 errors.push(GivenError::MissingColumn { name: name.to_owned(), column });
             }
         }
