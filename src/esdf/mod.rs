@@ -5,6 +5,10 @@
 //! to the union of the cubes, not to the cells' centres. Inside, the corners of free cubes are the sites.
 
 mod interpolate;
+mod kinds;
+mod line;
+#[cfg(test)]
+mod reference;
 mod transform;
 
 use crate::map::VoxelMap;
@@ -140,6 +144,64 @@ mod tests {
                 let numeric = (field.distance(high) - field.distance(low)) / (2.0 * h);
                 prop_assert!((numeric - gradient[a]).abs() < 1e-4, "axis {a}: {} vs {numeric}", gradient[a]);
             }
+        }
+    }
+
+    /// A map of upright boxes, single cells and holes; wide enough for long envelopes, and any height.
+    fn assert_like_reference(dims: [usize; 3], seed: u64, boxes: usize, cells: usize, outside: Unknown) {
+        let mut map = VoxelMap::new(0.25, [0.0; 3], dims, outside);
+        let mut state = seed | 1;
+        let mut below = |limit: usize| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as usize % limit
+        };
+        for _ in 0..boxes {
+            let low = dims.map(&mut below);
+            let high = [0, 1, 2].map(|a| low[a] + 1 + below(dims[a] / 3 + 1));
+            for i in low[0]..high[0].min(dims[0]) {
+                for j in low[1]..high[1].min(dims[1]) {
+                    (low[2]..high[2].min(dims[2])).for_each(|k| map.occupy([i, j, k]));
+                }
+            }
+        }
+        (0..cells).for_each(|_| map.occupy(dims.map(&mut below)));
+        let nodes = dims.map(|d| d + 1);
+        let expected = reference::signed_distance(&map, nodes);
+        let found = transform::signed_distance(&map, nodes);
+        for (at, (found, expected)) in found.iter().zip(&expected).enumerate() {
+            // Metres from squares in f32 here, in f64 there: roots and product round once each.
+            assert!((found - expected).abs() <= 2.5e-7 * expected.abs(), "{dims:?} node {at}: {found} vs {expected}");
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn the_transform_equals_the_plain_one(
+            dims in (1usize..90, 1usize..90, 1usize..40), seed in any::<u64>(), boxes in 0usize..12, cells in 0usize..40,
+            occupied in any::<bool>(),
+        ) {
+            let outside = if occupied { Unknown::Occupied } else { Unknown::Free };
+            assert_like_reference([dims.0, dims.1, dims.2], seed, boxes, cells, outside);
+        }
+    }
+
+    #[test]
+    fn heights_around_a_word_and_beyond_the_window_equal_the_plain_transform() {
+        for (seed, nz) in [31, 32, 63, 64, 65, 127, 128, 129, 200].into_iter().enumerate() {
+            for outside in [Unknown::Free, Unknown::Occupied] {
+                assert_like_reference([9, 20, nz], seed as u64, 4, 3, outside);
+                assert_like_reference([5, 17, nz], seed as u64, 40, 0, outside);
+            }
+        }
+    }
+
+    #[test]
+    fn full_and_dense_maps_equal_the_plain_transform() {
+        for outside in [Unknown::Free, Unknown::Occupied] {
+            assert_like_reference([40, 50, 20], 3, 0, 40_000, outside);
+            assert_like_reference([40, 50, 20], 4, 0, 400_000, outside);
+            assert_like_reference([70, 40, 10], 5, 400, 0, outside);
         }
     }
 

@@ -1,181 +1,174 @@
-//! The exact distance transform: one pass per axis, each O(nodes) (Felzenszwalb & Huttenlocher 2012, cited by \[SCR\] as [22]).
+//! The exact distance transform: squared distance to the nearest site is separable, one pass per axis.
+//!
+//! Along x a site is a bit, so the first pass counts steps from slab to slab (a slab: all nodes of one i), forwards into the
+//! result itself and backwards in one slab of memory. What is left is a matter of each slab alone, held in the cache. Within a
+//! slab y is fastest: row k holds the nodes (k, 0..ny), padded to whole blocks of `LANES`, so that loops over rows are loops
+//! over blocks. Those loops are functions that are never inlined: only so does the compiler know that their rows do not
+//! overlap, and takes four nodes at once.
+//!
+//! Squared distances are whole numbers in f32: exact up to 4096 cells, within rounding beyond.
 
 use super::FAR;
+use super::kinds::Kinds;
+use super::line::{LANES, Lines, NONE};
 use crate::map::VoxelMap;
 use crate::mission::Unknown;
 
-/// Squared distance, in cells, of a node with no site on its line yet. Small enough to add squares to without overflow.
-const NONE: i32 = i32::MAX / 4;
+/// Steps of a node with no site on its line; one more is lost in rounding. (2^24; its square is above `NONE`.)
+const NEVER: f32 = 16_777_216.0;
 
 /// Signed distances (m) at all nodes.
 pub(super) fn signed_distance(map: &VoxelMap, nodes: [usize; 3]) -> Vec<f32> {
-    let count = nodes[0] * nodes[1] * nodes[2];
-    let mut outside = vec![NONE; count];
-    let mut inside = Vec::new(); // made when the first node inside a solid is met
-    columns(map, nodes, &mut outside, &mut inside);
-    sweep_y_and_x(&mut outside, nodes);
-    if !inside.is_empty() {
-        sweep_y_and_x(&mut inside, nodes);
-    }
-    let metres = |squared: i32| if squared >= NONE { FAR } else { (f64::from(squared).sqrt() * map.resolution) as f32 };
-    let mut values: Vec<f32> = outside.iter().map(|d| metres(*d)).collect();
-    if !inside.is_empty() {
-        for (value, depth) in values.iter_mut().zip(&inside) {
-            if *depth > 0 {
-                *value -= metres(*depth);
-            }
+    let [nx, ny, nz] = nodes;
+    let size = ny * nz;
+    let mut values = vec![0.0f32; nx * size];
+    let mut kinds = Kinds::new(nodes);
+    let mut solids = vec![false; nx];
+    for i in 0..nx {
+        solids[i] = kinds.read(map, i);
+        let (done, slab) = values.split_at_mut(i * size);
+        for k in 0..nz {
+            let row = &mut slab[k * ny..][..ny];
+            let before = if i == 0 { None } else { Some(&done[(i - 1) * size + k * ny..][..ny]) };
+            step(row, kinds.row(k), before);
         }
     }
-    if map.outside == Unknown::Occupied {
-        bound_by_edges(map.resolution, nodes, &mut values);
+    let mut slabs = Slabs::new(map, [ny, nz]);
+    let mut after = vec![0.0; size];
+    for i in (0..nx).rev() {
+        let slab = &mut values[i * size..][..size];
+        if i + 1 == nx {
+            after.iter_mut().zip(&*slab).for_each(|(after, forwards)| *after = forwards * NEVER);
+        } else {
+            step_back(slab, &mut after);
+        }
+        let edge = if map.outside == Unknown::Occupied { i.min(nx - 1 - i) as f32 } else { f32::INFINITY };
+        slabs.outside(slab, &after, edge);
+        if solids[i] {
+            slabs.inside(slab, &after);
+        }
+        slabs.write(slab);
     }
     values
 }
 
-/// First pass, along z: squared distance to the nearest site in the same column. Sites of `outside` are the corners of
-/// occupied cells; of `inside` the corners of free ones (space above and below the grid is free).
-fn columns(map: &VoxelMap, nodes: [usize; 3], outside: &mut [i32], inside: &mut Vec<i32>) {
-    let [nx, ny, nz] = nodes;
-    let words = map.dims[2].div_ceil(64);
-    let mut any = vec![0u64; words]; // occupied in at least one of the four columns around the node
-    let mut all = vec![0u64; words]; // occupied in all four
-    let free_beyond = map.outside == Unknown::Free;
-    for i in 0..nx {
-        for j in 0..ny {
-            any.fill(0);
-            all.fill(u64::MAX);
-            for (a, b) in [(1, 1), (1, 0), (0, 1), (0, 0)] {
-                if i < a || j < b || i - a >= map.dims[0] || j - b >= map.dims[1] {
-                    if free_beyond {
-                        all.fill(0);
-                    }
-                    continue;
-                }
-                for (w, bits) in map.column(i - a, j - b).iter().enumerate() {
-                    any[w] |= bits;
-                    all[w] &= bits;
-                }
-            }
-            let at = (i * ny + j) * nz;
-            if any.iter().any(|w| *w != 0) {
-                line_of_bits(&mut outside[at..at + nz], |k| bit(&any, k) || (k > 0 && bit(&any, k - 1)));
-            }
-            let solid = |k: usize| k < map.dims[2] && bit(&all, k);
-            if (1..nz).any(|k| solid(k) && solid(k - 1)) {
-                if inside.is_empty() {
-                    inside.resize(outside.len(), 0);
-                }
-                line_of_bits(&mut inside[at..at + nz], |k| !(k > 0 && solid(k) && solid(k - 1)));
+/// Steps since the last node of another kind, signed: > 0 for free nodes, < 0 for nodes inside, 0 on surfaces.
+#[inline(never)]
+fn step(row: &mut [f32], kinds: impl Iterator<Item = f32>, before: Option<&[f32]>) {
+    match before {
+        None => row.iter_mut().zip(kinds).for_each(|(steps, kind)| *steps = kind * NEVER),
+        Some(before) => {
+            for ((steps, kind), before) in row.iter_mut().zip(kinds).zip(before) {
+                let same = kind * before;
+                *steps = kind * (if same > 0.0 { same } else { 0.0 } + 1.0);
             }
         }
     }
 }
 
-fn bit(words: &[u64], k: usize) -> bool {
-    words.get(k / 64).is_some_and(|w| w >> (k % 64) & 1 == 1)
-}
-
-/// Squared distance along one line to the nearest site.
-fn line_of_bits(line: &mut [i32], site: impl Fn(usize) -> bool) {
-    let mut distance = i32::MAX;
-    for (k, value) in line.iter_mut().enumerate() {
-        distance = if site(k) { 0 } else { distance.saturating_add(1) };
-        *value = distance;
-    }
-    distance = i32::MAX;
-    for value in line.iter_mut().rev() {
-        distance = if *value == 0 { 0 } else { distance.saturating_add(1) };
-        let nearest = (*value).min(distance);
-        *value = if nearest < 1 << 14 { nearest * nearest } else { NONE };
+/// The same from the other side. The kinds are the signs of the steps forwards.
+#[inline(never)]
+fn step_back(forwards: &[f32], after: &mut [f32]) {
+    for (after, forwards) in after.iter_mut().zip(forwards) {
+        let kind = forwards.clamp(-1.0, 1.0);
+        let same = kind * *after;
+        *after = kind * (if same > 0.0 { same } else { 0.0 } + 1.0);
     }
 }
 
-/// Second and third pass: lower envelopes of parabolas along y, then x.
-fn sweep_y_and_x(field: &mut [i32], [nx, ny, nz]: [usize; 3]) {
-    let mut envelope = Envelope::with_capacity(nx.max(ny));
-    for i in 0..nx {
-        for k in 0..nz {
-            envelope.line(field, i * ny * nz + k, nz, ny);
-        }
-    }
-    for j in 0..ny {
-        for k in 0..nz {
-            envelope.line(field, j * nz + k, ny * nz, nx);
-        }
-    }
+/// The passes along y and z, and their memory.
+struct Slabs {
+    lines: Lines,
+    size: [usize; 2],
+    stride: usize,
+    resolution: f32,
+    squares: Vec<f32>,
+    metres: Vec<f32>,
+    /// Distance to the grid's edges along y, cells.
+    edges: Vec<f32>,
+    /// Distance to the grid's edges in this slab, m.
+    bounds: Vec<f32>,
 }
 
-/// Scratch memory of one lower envelope.
-struct Envelope {
-    /// Position and height of each parabola on the envelope.
-    parabolas: Vec<(i32, i32)>,
-    /// Parabola m rules from `from[m]` on.
-    from: Vec<i32>,
-}
-
-impl Envelope {
-    fn with_capacity(n: usize) -> Self {
-        Self { parabolas: Vec::with_capacity(n), from: Vec::with_capacity(n) }
-    }
-
-    /// Replaces a line (first index, stride, length) by `min over m of (k - m)^2 + line[m]`.
-    fn line(&mut self, field: &mut [i32], first: usize, stride: usize, length: usize) {
-        self.parabolas.clear();
-        self.from.clear();
-        for m in 0..length {
-            let height = field[first + m * stride];
-            if height < NONE {
-                self.add(m as i32, height, length as i32);
-            }
-        }
-        if self.parabolas.is_empty() || (self.parabolas.len() == length && self.parabolas.iter().all(|p| p.1 == 0)) {
-            return;
-        }
-        for m in 0..self.parabolas.len() {
-            let (at, height) = self.parabolas[m];
-            let end = self.from.get(m + 1).copied().unwrap_or(length as i32);
-            for k in self.from[m]..end {
-                field[first + k as usize * stride] = height + (k - at) * (k - at);
-            }
+impl Slabs {
+    fn new(map: &VoxelMap, [ny, nz]: [usize; 2]) -> Self {
+        let stride = ny.next_multiple_of(LANES);
+        // Infinite where the edge is no wall.
+        let walled = map.outside == Unknown::Occupied;
+        let edge = |j: usize| if walled { j.min(ny - 1 - j) as f32 } else { f32::INFINITY };
+        let edges: Vec<f32> = (0..ny).map(edge).collect();
+        let squares = vec![0.0; stride * nz];
+        let metres = squares.clone();
+        Self {
+            lines: Lines::new([ny, nz]),
+            size: [ny, nz],
+            stride,
+            resolution: map.resolution as f32,
+            squares,
+            metres,
+            bounds: edges.clone(),
+            edges,
         }
     }
 
-    fn add(&mut self, at: i32, height: i32, length: i32) {
-        loop {
-            let Some(&(last, last_height)) = self.parabolas.last() else {
-                self.parabolas.push((at, height));
-                self.from.push(0);
-                return;
-            };
-            // The first k at which the new parabola is strictly lower than the last one.
-            let numerator = i64::from(height) + i64::from(at) * i64::from(at)
-                - i64::from(last_height)
-                - i64::from(last) * i64::from(last);
-            let start = numerator.div_euclid(2 * i64::from(at - last)) + 1;
-            let rules_from = *self.from.last().expect("one entry a parabola");
-            if start <= i64::from(rules_from) {
-                self.parabolas.pop();
-                self.from.pop();
-                continue;
+    /// Distance to the nearest site and, where `edge` is finite, to the grid's edge; `edge` is that along x, cells.
+    fn outside(&mut self, forwards: &[f32], after: &[f32], edge: f32) {
+        self.squares(forwards, after, 1.0);
+        self.lines.transform(&mut self.squares);
+        for (bound, along) in self.bounds.iter_mut().zip(&self.edges) {
+            *bound = if *along < edge { *along } else { edge } * self.resolution;
+        }
+        let rows = self.metres.chunks_exact_mut(self.stride).zip(self.squares.chunks_exact(self.stride));
+        rows.for_each(|(metres, squares)| to_metres(metres, squares, &self.bounds, self.resolution));
+    }
+
+    /// Subtracts the depth of the nodes inside: the distance to the nearest node that is not.
+    fn inside(&mut self, forwards: &[f32], after: &[f32]) {
+        self.squares(forwards, after, -1.0);
+        self.lines.transform(&mut self.squares);
+        subtract_depth(&mut self.metres, &self.squares, self.resolution);
+    }
+
+    /// Squared distance along x for the nodes whose steps have this sign, 0 for all others.
+    fn squares(&mut self, forwards: &[f32], after: &[f32], sign: f32) {
+        let ny = self.size[0];
+        let steps = forwards.chunks_exact(ny).zip(after.chunks_exact(ny));
+        for (row, (forwards, after)) in self.squares.chunks_exact_mut(self.stride).zip(steps) {
+            nearest(&mut row[..ny], forwards, after, sign);
+        }
+    }
+
+    /// To the layout of the field: z fastest.
+    fn write(&self, slab: &mut [f32]) {
+        for (j, column) in slab.chunks_exact_mut(self.size[1]).enumerate() {
+            for (value, metres) in column.iter_mut().zip(self.metres[j..].iter().step_by(self.stride)) {
+                *value = *metres;
             }
-            if start < i64::from(length) {
-                self.parabolas.push((at, height));
-                self.from.push(start as i32);
-            }
-            return;
         }
     }
 }
 
-/// The grid's edges in x and y are walls.
-fn bound_by_edges(resolution: f64, [nx, ny, nz]: [usize; 3], values: &mut [f32]) {
-    for i in 0..nx {
-        for j in 0..ny {
-            let cells = i.min(nx - 1 - i).min(j).min(ny - 1 - j);
-            let edge = (cells as f64 * resolution) as f32;
-            for value in &mut values[(i * ny + j) * nz..][..nz] {
-                *value = value.min(edge);
-            }
-        }
+#[inline(never)]
+fn nearest(squares: &mut [f32], forwards: &[f32], after: &[f32], sign: f32) {
+    for ((square, forwards), after) in squares.iter_mut().zip(forwards).zip(after) {
+        let (forwards, after) = (sign * forwards, sign * after);
+        let steps = if forwards < after { forwards } else { after };
+        let steps = if steps > 0.0 { steps } else { 0.0 };
+        *square = steps * steps;
+    }
+}
+
+#[inline(never)]
+fn to_metres(metres: &mut [f32], squares: &[f32], bounds: &[f32], resolution: f32) {
+    for ((metres, square), bound) in metres.iter_mut().zip(squares).zip(bounds) {
+        let distance = if *square >= NONE { FAR } else { square.sqrt() * resolution };
+        *metres = if distance < *bound { distance } else { *bound };
+    }
+}
+
+#[inline(never)]
+fn subtract_depth(metres: &mut [f32], squares: &[f32], resolution: f32) {
+    for (metres, square) in metres.iter_mut().zip(squares) {
+        *metres -= if *square >= NONE { FAR } else { square.sqrt() * resolution };
     }
 }

@@ -1,0 +1,244 @@
+//! Distance transforms of lines: `f(k)` becomes `min over m of f(m) + (k - m)^2`.
+//!
+//! Two ways, both exact. Where values are low everywhere, they bound how far a site can help: a window, in whole blocks of
+//! nodes. Else the lower envelope of parabolas (Felzenszwalb & Huttenlocher 2012, cited by \[SCR\] as [22]), O(nodes) whatever
+//! the values.
+
+/// Squares from here on mean: no site.
+pub(super) const NONE: f32 = 1.0e14;
+/// Nodes handled together.
+pub(super) const LANES: usize = 16;
+/// A row goes through the window if each block has a value up to this in itself or beside itself; the window then ends
+/// within `PAD`.
+const LOW: f32 = 64.0;
+const PAD: usize = 48;
+/// Columns higher than this take the envelope.
+const TALL: usize = 128;
+
+type Block = [f32; LANES];
+
+/// A parabola on the lower envelope.
+#[derive(Clone, Copy, Default)]
+struct Parabola {
+    /// Its lowest point is (`at`, `height`).
+    at: f32,
+    height: f32,
+    /// `height + at^2`.
+    key: f64,
+    /// It rules beyond this abscissa.
+    from: f64,
+}
+
+/// Transforms slabs; holds their memory.
+pub(super) struct Lines {
+    size: [usize; 2],
+    stride: usize,
+    parabolas: Vec<Parabola>,
+    /// 1 / (2 d).
+    halves: Vec<f64>,
+    /// A line as it was, with `PAD` of nothing before it and behind it.
+    line: Vec<f32>,
+    /// Lowest value of each column.
+    low: Vec<f32>,
+    slab: Vec<f32>,
+}
+
+impl Lines {
+    /// For slabs of nz rows of ny nodes, the rows padded to whole blocks.
+    pub(super) fn new([ny, nz]: [usize; 2]) -> Self {
+        let stride = ny.next_multiple_of(LANES);
+        let longest = ny.max(nz);
+        Self {
+            size: [ny, nz],
+            stride,
+            parabolas: vec![Parabola::default(); longest + 1],
+            halves: (0..longest + 1).map(|d| 0.5 / d as f64).collect(),
+            line: vec![f32::MAX; longest.next_multiple_of(LANES) + 2 * PAD],
+            low: vec![0.0; stride],
+            slab: vec![0.0; stride * nz],
+        }
+    }
+
+    /// Transforms along rows, then along columns.
+    pub(super) fn transform(&mut self, slab: &mut [f32]) {
+        let [ny, nz] = self.size;
+        // Solids are upright as a rule, so a row often equals the row below.
+        for k in 0..nz {
+            let (below, row) = slab.split_at_mut(k * self.stride);
+            let row = &mut row[..ny];
+            if k > 0 && equal(row, &self.line[PAD..PAD + ny]) {
+                row.copy_from_slice(&below[(k - 1) * self.stride..][..ny]);
+                continue;
+            }
+            self.line[PAD..PAD + ny].copy_from_slice(row);
+            if low_everywhere(row) {
+                self.window(row);
+            } else {
+                self.envelope(row);
+            }
+        }
+        if nz <= TALL {
+            self.columns(slab);
+            return;
+        }
+        for j in 0..ny {
+            let mut column: Vec<f32> = slab[j..].iter().step_by(self.stride).copied().collect();
+            self.envelope(&mut column);
+            slab[j..].iter_mut().step_by(self.stride).zip(&column).for_each(|(value, new)| *value = *new);
+        }
+    }
+
+    /// The row whose copy is in `line`.
+    fn window(&self, row: &mut [f32]) {
+        for (b, out) in row.chunks_mut(LANES).enumerate() {
+            let at = PAD + b * LANES;
+            let mut best = block(&self.line, at);
+            let mut d = 1;
+            while d < PAD && highest(&best) > (d * d) as f32 {
+                lower(&mut best, &block(&self.line, at - d), (d * d) as f32);
+                lower(&mut best, &block(&self.line, at + d), (d * d) as f32);
+                d += 1;
+            }
+            out.copy_from_slice(&best[..out.len()]);
+        }
+    }
+
+    /// Zeros are never improved and hide what lies behind them, so the runs between them are solved alone.
+    fn envelope(&mut self, line: &mut [f32]) {
+        let length = line.len();
+        let mut next = 0;
+        while let Some(start) = line[next..].iter().position(|f| *f > 0.0) {
+            let start = next + start;
+            let end = line[start..].iter().position(|f| *f == 0.0).map_or(line.len(), |n| start + n);
+            self.run(&mut line[start.saturating_sub(1)..(end + 1).min(length)]);
+            next = end;
+        }
+    }
+
+    fn run(&mut self, line: &mut [f32]) {
+        let nodes = line.len();
+        let mut top = 0;
+        // Abscissae count from 1, so that all are positive and cutting is rounding down.
+        for (m, height) in line.iter().enumerate() {
+            if *height >= NONE {
+                continue;
+            }
+            let at = (m + 1) as f32;
+            let key = f64::from(*height) + f64::from(at) * f64::from(at);
+            let mut from = 0.0;
+            while top > 0 {
+                let rival = &self.parabolas[top - 1];
+                from = (key - rival.key) * self.halves[(at - rival.at) as usize];
+                if from > rival.from {
+                    break;
+                }
+                top -= 1;
+                from = 0.0;
+            }
+            if from < nodes as f64 {
+                self.parabolas[top] = Parabola { at, height: *height, key, from };
+                top += 1;
+            }
+        }
+        let mut end = nodes;
+        for parabola in self.parabolas[..top].iter().rev() {
+            let from = parabola.from as usize;
+            for (k, value) in line[from..end].iter_mut().enumerate() {
+                let d = (from + k + 1) as f32 - parabola.at;
+                *value = parabola.height + d * d;
+            }
+            end = from;
+        }
+    }
+
+    /// A column's value gains at most what it differs from the column's lowest: no site further than the root of that helps.
+    #[inline(never)]
+    fn columns(&mut self, slab: &mut [f32]) {
+        let nz = self.size[1];
+        self.low.copy_from_slice(&slab[..self.stride]);
+        for row in slab.chunks_exact(self.stride) {
+            self.low.iter_mut().zip(row).for_each(|(low, value)| *low = if value < low { *value } else { *low });
+        }
+        self.slab.copy_from_slice(slab);
+        for (k, row) in slab.chunks_exact_mut(self.stride).enumerate() {
+            for (b, out) in row.chunks_exact_mut(LANES).enumerate() {
+                let mut best = block(out, 0);
+                let low = block(&self.low, b * LANES);
+                let mut gain = most_above(&best, &low);
+                if gain <= 0.0 {
+                    continue;
+                }
+                let mut d = 1;
+                while d < nz && gain > (d * d) as f32 {
+                    if k >= d {
+                        lower(&mut best, &block(&self.slab, (k - d) * self.stride + b * LANES), (d * d) as f32);
+                    }
+                    if k + d < nz {
+                        lower(&mut best, &block(&self.slab, (k + d) * self.stride + b * LANES), (d * d) as f32);
+                    }
+                    if d % 4 == 0 {
+                        gain = most_above(&best, &low);
+                    }
+                    d += 1;
+                }
+                out.copy_from_slice(&best);
+            }
+        }
+    }
+}
+
+/// Without an early end, so that it runs in blocks.
+#[inline(never)]
+fn equal(a: &[f32], b: &[f32]) -> bool {
+    a.iter().zip(b).fold(0, |differ, (a, b)| differ | (a.to_bits() ^ b.to_bits())) == 0
+}
+
+/// Whether each block has a low value in itself or beside itself.
+#[inline(never)]
+fn low_everywhere(row: &[f32]) -> bool {
+    let mut blocks = row.chunks(LANES).map(|b| b.iter().fold(NONE, |low, f| if *f < low { *f } else { low }) <= LOW);
+    let mut before = false;
+    let mut here = blocks.next().unwrap_or(true);
+    for next in blocks {
+        if !(before || here || next) {
+            return false;
+        }
+        (before, here) = (here, next);
+    }
+    before || here
+}
+
+#[inline]
+fn block(line: &[f32], at: usize) -> Block {
+    line[at..at + LANES].try_into().expect("as long as a block")
+}
+
+#[inline]
+fn lower(best: &mut Block, site: &Block, square: f32) {
+    for (best, site) in best.iter_mut().zip(site) {
+        let through = site + square;
+        *best = if through < *best { through } else { *best };
+    }
+}
+
+/// The most that a value lies above its column's lowest.
+#[inline]
+fn most_above(values: &Block, low: &Block) -> f32 {
+    let mut above = *values;
+    above.iter_mut().zip(low).for_each(|(above, low)| *above -= low);
+    highest(&above)
+}
+
+/// Highest value, by halves.
+#[inline]
+fn highest(block: &Block) -> f32 {
+    let mut top = *block;
+    let mut width = LANES / 2;
+    while width > 0 {
+        for lane in 0..width {
+            top[lane] = if top[lane + width] > top[lane] { top[lane + width] } else { top[lane] };
+        }
+        width /= 2;
+    }
+    top[0]
+}
