@@ -21,7 +21,7 @@ pub struct InspectArgs {
     #[arg(long, value_name = "M", default_value_t = 0.05)]
     resolution: f64,
     /// Heights in metres between which a map's points are obstacles: two numbers, the lower first.
-    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 2, default_values_t = [0.02, 2.0])]
+    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', default_values_t = [0.02, 2.0])]
     height: Vec<f64>,
 }
 
@@ -88,9 +88,13 @@ fn of_robot(path: &Path) -> Result<String, Diagnostics> {
 }
 
 fn of_map(args: &InspectArgs, path: &Path) -> Result<String, Diagnostics> {
-    let height = [args.height[0], args.height[1]];
-    if !(height[0] < height[1] && args.resolution > 0.0) {
-        let message = format!("--height {} {} is no slab", height[0], height[1]);
+    let &[low, high] = args.height.as_slice() else {
+        let message = format!("--height needs two numbers, found {}", args.height.len());
+        return Err(Diagnostic::error("inspect/height", message).hint("for example --height 0.02,1.0").into());
+    };
+    let height = [low, high];
+    if !(low < high && args.resolution > 0.0) {
+        let message = format!("--height {low},{high} is no slab");
         return Err(Diagnostic::error("inspect/height", message).hint("give the lower end first, metres").into());
     }
     let file = read_map_file(path, &Disk::default(), None)?;

@@ -189,7 +189,16 @@ impl PathReference {
         let vertex = self.vertices[nearest];
         let near = square(vertex.point, point).sqrt();
         match &self.courses[vertex.course as usize] {
-            Course::Curved(curved) => near.min(distance_to_curve(&curved.curve, vertex.place, point)),
+            Course::Curved(curved) => {
+                let parameter = |k: usize| {
+                    let other = self.vertices.get(k).filter(|v| v.course == vertex.course);
+                    other.map(|v| curved.curve.parameter(v.place))
+                };
+                let own = curved.curve.parameter(vertex.place);
+                let low = nearest.checked_sub(1).and_then(parameter).unwrap_or(own);
+                let high = parameter(nearest + 1).unwrap_or(own);
+                near.min(distance_to_curve(&curved.curve, [low, own, high], point))
+            }
             Course::Proportional(p) if p.drive != 0.0 => {
                 let (sin, cos) = p.pose.yaw.sin_cos();
                 let offset = [point[0] - p.pose.x, point[1] - p.pose.y];
@@ -237,25 +246,29 @@ impl PathReference {
     }
 }
 
-/// Distance to the foot of the perpendicular near a place, by Newton on the tangential offset; never farther than from the place.
-fn distance_to_curve(curve: &PlaneCurve, place: Place, point: [f64; 2]) -> f64 {
-    let duration = curve.duration();
-    let mut u = curve.parameter(place);
+/// Distance from a point to the part of a curve between two parameters, from a first guess between them: Newton's steps on the
+/// foot's condition, halving the bracket where a step leaves it (at rest and near it the parameter is far from arc length).
+fn distance_to_curve(curve: &PlaneCurve, [mut low, mut u, mut high]: [f64; 3], point: [f64; 2]) -> f64 {
     let mut best = f64::INFINITY;
-    for _ in 0..4 {
+    for _ in 0..40 {
         let at = curve.place(u);
         let (x, y) = (curve.jet(0, at), curve.jet(1, at));
         let offset = [x[0] - point[0], y[0] - point[1]];
         best = best.min(offset[0].hypot(offset[1]));
         let slope = offset[0] * x[1] + offset[1] * y[1];
         let bend = x[1] * x[1] + y[1] * y[1] + offset[0] * x[2] + offset[1] * y[2];
-        if bend <= 0.0 {
-            break;
+        if slope > 0.0 {
+            high = u;
+        } else {
+            low = u;
         }
-        let step = slope / bend;
-        u = (u - step).clamp(0.0, duration);
+        let newton = u - slope / bend;
+        let next = if bend > 0.0 && newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        let step = next - u;
+        u = next;
         // What is left changes the distance by the square of the step, over the distance.
-        if step * step * bend <= 1e-9 * best * best {
+        let speed = x[1] * x[1] + y[1] * y[1];
+        if step * step * speed <= 1e-9 * best * best || step == 0.0 {
             break;
         }
     }

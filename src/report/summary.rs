@@ -32,6 +32,10 @@ pub fn render(inputs: &SummaryInputs<'_>) -> String {
     }
 }
 
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
 fn certified(inputs: &SummaryInputs<'_>) -> String {
     let report = inputs.report;
     let mut out = format!("{}: CERTIFIED\n\n", inputs.mission);
@@ -110,9 +114,9 @@ fn motion(out: &mut String, report: &Report) {
     let mut parts = Vec::new();
     if let Some(trajectory) = &report.trajectory {
         parts.push(match trajectory.source.as_str() {
-            "optimised" => format!("optimised, {} pieces", trajectory.pieces),
+            "optimised" => format!("optimised, {}", counted(trajectory.pieces, "piece")),
             "search" => "the search's own (stop, turn, go): no smooth one could be certified".to_string(),
-            _ => format!("given, {} pieces", trajectory.pieces),
+            _ => format!("given, {}", counted(trajectory.pieces, "piece")),
         });
         if let (Some(iterations), Some(ending)) = (trajectory.iterations, &trajectory.ending) {
             parts.push(format!("{iterations} iterations, {}", ending.replace('_', " ")));
