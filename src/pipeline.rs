@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use crate::certify::{self, Certificate, Goal, Task};
+use crate::certify::{self, Certificate, Goal, RefusalKind, Task};
 use crate::command::{self, CommandTable, SampleOptions};
 use crate::diag::{Diagnostic, Diagnostics, Span, nearest};
 use crate::esdf;
@@ -186,7 +186,7 @@ fn stages(
     run.report.commands = Some((&commands).into());
     run.report.judge(&certificate);
     if !certificate.holds() {
-        return Err(refused(&certificate).into());
+        return Err(refused(&certificate, trajectory.source).into());
     }
     if !mission.path_error_times.is_empty() {
         let rows = run.stage("path_error", || finish.path_errors(&profile, &trajectory));
@@ -452,10 +452,17 @@ fn given_path(
     Ok(trajectory)
 }
 
-fn refused(certificate: &Certificate) -> Diagnostic {
+fn refused(certificate: &Certificate, source: TrajectorySource) -> Diagnostic {
     let reasons: Vec<&str> = certificate.refusals.iter().map(|r| r.message.as_str()).collect();
-    Diagnostic::failure("certify/refused", format!("the certificate is refused: {}", reasons.join("; ")))
-        .hint("lower `clearance_m` or the speed limits, or shorten `sampling_time_s`")
+    let too_close = certificate.refusals.iter().all(|r| r.kind == RefusalKind::Clearance);
+    let hint = match source {
+        TrajectorySource::Given if too_close => {
+            "a given path is driven as it is: lead it around the obstacle, or lower `clearance_m`"
+        }
+        _ if too_close => "lower `clearance_m`, or shorten `sampling_time_s`: held commands cut curves",
+        _ => "lower `clearance_m` or the speed limits, or shorten `sampling_time_s`",
+    };
+    Diagnostic::failure("certify/refused", format!("the certificate is refused: {}", reasons.join("; "))).hint(hint)
 }
 
 fn profile_part(profile: &MotionProfile, commands: &CommandTable) -> ProfilePart {

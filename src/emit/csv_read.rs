@@ -124,7 +124,7 @@ impl Reader<'_> {
 
     fn read(&mut self) -> Option<(CommandTable, CsvHeader)> {
         if self.lines.is_empty() {
-            self.fault("commands/empty", "the file is empty".into(), 0..0);
+            self.fault("commands/format", "this is no command file: it is empty".into(), 0..0);
             return None;
         }
         let notes = self.lines.iter().take_while(|l| self.text(l).starts_with('#')).count();

@@ -69,10 +69,10 @@ pub(super) enum MapError {
     #[error("the compressed block says {said} bytes unpacked, but the header's points take {expected}")]
     UnpackedSize { said: u64, expected: u128 },
     /// Nothing to build a map from.
-    #[error("no points: the file has {points}, of which {not_finite} are not finite")]
+    #[error("no points: {}", if *points == 0 { "the file has none".into() } else { format!("the file has {points}, of which {not_finite} are not finite") })]
     NoPoints { points: usize, not_finite: usize },
     /// Coordinates that cannot be metres on a floor.
-    #[error("coordinates reach {value:e} m along {axis}: farther than {limit} m from the origin")]
+    #[error("coordinates reach {} m along {axis}: farther than {limit} m from the origin", short(*value))]
     FarAway { value: f64, axis: char, limit: f64 },
     /// The grid would not fit in memory.
     #[error("the grid would have {} x {} x {} cells of {resolution} m: more than can be handled", dims[0], dims[1], dims[2])]
@@ -128,6 +128,11 @@ pub(super) enum MapError {
     /// A pixel lighter than white.
     #[error("pixel {index} is {value}, above the image's own maximum {max}")]
     Pixel { index: usize, value: u64, max: u32 },
+}
+
+/// Digits that can be read: 1e300, not a one with 300 zeros.
+fn short(value: f64) -> String {
+    if value.abs() < 1e12 { value.to_string() } else { format!("{value:e}") }
 }
 
 impl MapError {

@@ -231,7 +231,8 @@ fn wheel_radius(
                 name(first),
                 name(*j)
             );
-            faults.push(Diagnostic::error("robot/unequal-wheels", message).at(&urdf.joint_spans[*j]));
+            let hint = "a differential drive needs equal wheels; if only the model is wrong, give drive.wheel_radius_m in robot.yaml";
+            faults.push(Diagnostic::error("robot/unequal-wheels", message).at(&urdf.joint_spans[*j]).hint(hint));
         }
     }
     match (&spec.wheel_radius, known.first()) {

@@ -1,0 +1,181 @@
+//! `compile` on the missions that are shipped, and what it leaves.
+
+use serde_json::Value;
+
+use super::sandbox::{Sandbox, repository};
+
+const MISSIONS: [&str; 7] = ["first", "c_curve", "s_curve", "arbitrary", "barn_29", "depot", "levine"];
+const FILES: [&str; 6] =
+    ["commands.csv", "commands.d", "commands.mcap", "path_error.csv", "report.json", "timings.json"];
+
+fn mission(name: &str) -> String {
+    repository().join(format!("missions/{name}.yaml")).display().to_string()
+}
+
+/// Compiles a shipped mission into the sandbox and checks every promise about the folder.
+fn compiles(name: &str) {
+    let sandbox = Sandbox::new();
+    let run = sandbox.run(&["compile", &mission(name)]).expect(0);
+    assert_eq!(run.stderr, "");
+    assert!(run.stdout.starts_with(&format!("{name}: CERTIFIED\n")), "{}", run.stdout);
+    assert!(run.stdout.contains(&format!("Next: trajc check out/{name}/commands.csv")), "{}", run.stdout);
+    let folder = format!("out/{name}");
+    for file in FILES {
+        assert!(sandbox.exists(&format!("{folder}/{file}")), "{file}");
+    }
+    for name in sandbox.list(&folder) {
+        assert!(FILES.contains(&name.as_str()) || name == "report.html", "{name}");
+    }
+    assert_eq!(sandbox.list("out"), [name], "nothing is left beside");
+    let report: Value = serde_json::from_slice(&sandbox.read(&format!("{folder}/report.json"))).expect("JSON");
+    assert_eq!(report["status"], "certified");
+
+    for file in ["commands.csv", "commands.mcap"] {
+        let run = sandbox.run(&["check", &format!("{folder}/{file}")]).expect(0);
+        assert!(run.stdout.contains("all checks hold") && !run.stdout.contains("note"), "{}", run.stdout);
+        assert_eq!(run.stderr, "");
+    }
+    let first = snapshot(&sandbox, &folder);
+    sandbox.run(&["compile", &mission(name)]).expect(0);
+    assert!(first == snapshot(&sandbox, &folder), "{name}: the second run wrote other bytes");
+}
+
+/// All files but the one that tells times.
+fn snapshot(sandbox: &Sandbox, folder: &str) -> Vec<(String, Vec<u8>)> {
+    let names = sandbox.list(folder).into_iter().filter(|n| n != "timings.json");
+    names.map(|name| (name.clone(), sandbox.read(&format!("{folder}/{name}")))).collect()
+}
+
+#[test]
+fn the_missions_that_are_shipped_compile_twice_to_the_same_bytes_and_pass_their_own_check() {
+    MISSIONS.iter().for_each(|name| compiles(name));
+}
+
+#[test]
+fn a_robot_that_changes_shape_crosses_the_arch_bridges() {
+    compiles("arch_bridges");
+}
+
+#[test]
+fn where_the_program_stands_and_where_it_writes_change_no_motion() {
+    let sandbox = Sandbox::compiled();
+    let body = |path: &str| {
+        let text = sandbox.text(path);
+        text.lines().filter(|l| !l.starts_with("# mission:")).map(|l| format!("{l}\n")).collect::<String>()
+    };
+    sandbox.run_in("robots", &["compile", "../missions/a.yaml", "--out", "deep/er/out"]).expect(0);
+    assert_eq!(body("out/a/commands.csv"), body("robots/deep/er/out/a/commands.csv"));
+    let own = sandbox.text("robots/deep/er/out/a/commands.csv");
+    assert!(own.contains("# mission: ../../../../../missions/a.yaml\n"), "{own}");
+    let absolute = sandbox.path("missions/a.yaml").display().to_string();
+    let out = sandbox.path("else where/ö").display().to_string();
+    let run = sandbox.run(&["compile", &absolute, "--out", &out]).expect(0);
+    assert!(run.stdout.contains("<here>/else where/ö/a/"), "{}", run.stdout);
+    assert_eq!(body("out/a/commands.csv"), body("else where/ö/a/commands.csv"));
+    for out in ["robots/deep/er/out", "else where/ö"] {
+        for file in ["commands.csv", "commands.mcap"] {
+            sandbox.run_in("maps", &["check", &format!("../{out}/a/{file}")]).expect(0);
+        }
+    }
+}
+
+#[test]
+fn options_of_the_command_line_win_over_the_mission() {
+    let sandbox = Sandbox::new();
+    sandbox.run(&["compile", "missions/a.yaml", "--sampling-time", "0.05", "--format", "csv"]).expect(0);
+    let csv = sandbox.text("out/a/commands.csv");
+    assert!(csv.contains("# sampling_time_s: 0.05\n"), "{csv}");
+    assert!(!sandbox.exists("out/a/commands.mcap"));
+    sandbox.run(&["check", "out/a/commands.csv"]).expect(0);
+
+    sandbox.run(&["compile", "missions/a.yaml", "--format", "mcap"]).expect(0);
+    assert!(sandbox.exists("out/a/commands.mcap") && !sandbox.exists("out/a/commands.csv"), "older files go");
+    let depfile = sandbox.text("out/a/commands.d");
+    assert!(depfile.starts_with("out/a/commands.mcap:"), "{depfile}");
+    sandbox.run(&["check", "out/a/commands.mcap"]).expect(0);
+}
+
+#[test]
+fn json_on_stdout_is_the_report_and_nothing_else() {
+    let sandbox = Sandbox::new();
+    let run = sandbox.run(&["compile", "missions/a.yaml", "--json"]).expect(0);
+    assert_eq!(run.stdout, sandbox.text("out/a/report.json"));
+    let report: Value = serde_json::from_str(&run.stdout).expect("JSON");
+    assert_eq!(report["schema"], "trajc.report/1");
+    assert_eq!(report["certificate"]["limits_hold"], true);
+
+    let check = sandbox.run(&["check", "out/a/commands.csv", "--json"]).expect(0);
+    let verdict: Value = serde_json::from_str(&check.stdout).expect("JSON");
+    assert_eq!(verdict["holds"], true);
+    assert_eq!(verdict["certificate"], report["certificate"], "check proves what compile proved");
+    assert_eq!(verdict["limits"], report["limits"]);
+}
+
+#[test]
+fn the_depfile_names_every_input() {
+    let sandbox = Sandbox::compiled();
+    let depfile = sandbox.text("out/a/commands.d");
+    for input in ["missions/a.yaml", "robots/box_base/robot.yaml", "robots/box_base/box_base.urdf", "maps/first.csv"] {
+        assert!(depfile.contains(input), "{input}:\n{depfile}");
+    }
+}
+
+#[test]
+fn files_of_others_in_the_output_folder_stay() {
+    let sandbox = Sandbox::compiled();
+    sandbox.write("out/a/notes.txt", "mine");
+    sandbox.run(&["compile", "missions/a.yaml"]).expect(0);
+    assert_eq!(sandbox.text("out/a/notes.txt"), "mine");
+    sandbox.edit("missions/a.yaml", "x_m: 3.4", "x_m: 34");
+    sandbox.run(&["compile", "missions/a.yaml"]).expect(1);
+    assert_eq!(sandbox.list("out/a"), ["notes.txt", "report.json", "timings.json"]);
+}
+
+#[test]
+fn a_mission_need_not_name_what_has_a_default() {
+    let sandbox = Sandbox::new();
+    let text = "robot: ../robots/box_base/robot.yaml\nmap: {file: ../maps/first.csv}\n\
+                start: {x_m: 0.6, y_m: 1.5, yaw: 0}\ngoal: {x_m: 3.4, y_m: 1.5}\n";
+    sandbox.write("missions/short.yaml", text);
+    sandbox.run(&["compile", "missions/short.yaml"]).expect(0);
+    sandbox.run(&["check", "out/short/commands.csv"]).expect(0);
+}
+
+#[test]
+fn path_error_of_a_mission_and_of_its_command_file_agree() {
+    let sandbox = Sandbox::new();
+    let times = ["--sampling-times", "0.01,0.1,0.5"];
+    let run = sandbox.run(&[&["path-error", &mission("c_curve"), "--json"], &times[..]].concat()).expect(0);
+    let rows: Value = serde_json::from_str(&run.stdout).expect("JSON");
+    let rows = rows["path_error"].as_array().expect("rows").clone();
+    let lateral = |row: &Value| row["lateral_max_m"].as_f64().expect("number");
+    assert_eq!(rows.len(), 3);
+    assert!(lateral(&rows[0]) < lateral(&rows[1]) && lateral(&rows[1]) < lateral(&rows[2]), "{rows:?}");
+
+    sandbox.run(&["compile", &mission("c_curve")]).expect(0);
+    for file in ["commands.csv", "commands.mcap"] {
+        let run = sandbox.run(&["path-error", &format!("out/c_curve/{file}"), "--json"]).expect(0);
+        let own: Value = serde_json::from_str(&run.stdout).expect("JSON");
+        let own = lateral(&own["path_error"][0]);
+        assert!((own - lateral(&rows[1])).abs() < 1e-6, "{own} {rows:?}");
+    }
+    let csv = sandbox.run(&["path-error", "out/c_curve/commands.csv", "--csv"]).expect(0).stdout;
+    assert!(csv.starts_with("sampling_time_s,sampling,lateral_max_m"), "{csv}");
+    let table = sandbox.run(&["path-error", "missions/a.yaml", "--sampling-times", "0.1,0.2"]).expect(0).stdout;
+    assert_eq!(table.lines().count(), 3, "{table}");
+}
+
+#[test]
+fn schemas_and_completions_are_printed() {
+    let sandbox = Sandbox::new();
+    for file in ["mission", "robot", "report"] {
+        let schema: Value = serde_json::from_str(&sandbox.run(&["schema", file]).expect(0).stdout).expect("JSON");
+        assert!(schema["properties"].is_object(), "{file}");
+    }
+    let script = sandbox.run(&["completions", "bash"]).expect(0).stdout;
+    assert!(script.contains("trajc") && script.contains("path-error"), "{script}");
+    let help = sandbox.run(&["--help"]).expect(0).stdout;
+    for command in ["compile", "check", "path-error", "inspect", "schema", "completions"] {
+        assert!(help.contains(command), "{help}");
+    }
+}
