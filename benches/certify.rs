@@ -34,7 +34,13 @@ fn robot() -> RobotModel {
         track_width: 0.32,
         root_link: "base".into(),
         base_from_root: Isometry3::identity(),
-        joints: vec![MovingJoint { name: "blade".into(), prismatic: false, lower: -0.1, upper: std::f64::consts::PI, limits }],
+        joints: vec![MovingJoint {
+            name: "blade".into(),
+            prismatic: false,
+            lower: -0.1,
+            upper: std::f64::consts::PI,
+            limits,
+        }],
         bodies: vec![body("base", Isometry3::identity(), None), hinge(1.0), hinge(-1.0)],
         shapes: vec![
             shape("base", 0, Isometry3::translation(-0.09, 0.0, 0.14), Convex::Box { half: [0.21, 0.18, 0.11] }),

@@ -18,6 +18,8 @@
 //! | [`report`] | [`report::Report`] | the nouns above |
 //! | [`emit`] | bytes | `CommandTable`, `Report` |
 //!
+//! [`pipeline`] runs them; [`eval`] runs it over suites of scenes; [`cli`] is the program.
+//!
 //! # Papers
 //! *\[SCR\]*: Zhang, Xu, Gao, Cao, "Trajectory Optimization for 3D Shape-Changing Robots with Differential Mobile Base".
 //! *\[CONV\]*: Yang, Choi, "Joint Space Trajectory Planning Considering Physical Limits with Convolution Operator for Mobile
@@ -35,6 +37,7 @@ pub mod command;
 pub mod diag;
 pub mod emit;
 pub mod esdf;
+pub mod eval;
 pub mod geom;
 pub mod map;
 pub mod math;
