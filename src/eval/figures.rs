@@ -36,7 +36,12 @@ fn scene(suite: Option<Suite>, judged: &Judged) -> Value {
         "esdf_ms": judged.ms("esdf"),
         "expanded": judged.expanded,
         "iterations": judged.iterations,
+        "ending": judged.ending,
+        "drives": judged.legs.map(|l| l[0]),
+        "spins": judged.legs.map(|l| l[1]),
         "initial": judged.initial,
+        "planned": judged.planned,
+        "driven": judged.driven,
         "bound_s": judged.bound.1,
     });
     if let (Some(failure), Value::Object(map)) = (&judged.failure, &mut scene) {

@@ -12,6 +12,7 @@ use crate::report::metrics;
 use crate::report::schema::Failure;
 use crate::report::{Metrics, Status};
 use crate::robot::RobotModel;
+use crate::trajectory::{Leg, Trajectory};
 
 /// What became of a scene.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,10 +27,14 @@ pub struct Judged {
     pub failure: Option<Failure>,
     /// What was certified, or tried last: `optimised`, or `search` where that failed.
     pub source: Option<String>,
+    /// Drives and turns on the spot that it has.
+    pub legs: Option<[usize; 2]>,
     /// States that the search took up.
     pub expanded: Option<usize>,
     /// Iterations of the optimiser's last try.
     pub iterations: Option<usize>,
+    /// How that ended.
+    pub ending: Option<String>,
     /// Of the search's path before anything smoothed it.
     pub initial: Option<Metrics>,
     /// Of the optimised trajectory in its own timing; of the driven path where the search's path was driven.
@@ -99,8 +104,10 @@ pub fn judge(
         certified: report.status == Status::Certified,
         failure: report.failure.clone(),
         source,
+        legs: compiled.map(|c| legs(&c.trajectory)),
         expanded: report.search.as_ref().map(|s| s.expanded),
         iterations: trajectory.and_then(|t| t.iterations),
+        ending: trajectory.and_then(|t| t.ending.clone()),
         initial: report.initial.as_ref().map(|i| i.metrics),
         planned,
         driven: compiled.map(|c| metrics::of_commands(&c.commands)),
@@ -111,6 +118,12 @@ pub fn judge(
         timings,
     };
     Ok((judged, outcome))
+}
+
+/// Drives and turns on the spot.
+fn legs(trajectory: &Trajectory) -> [usize; 2] {
+    let drives = trajectory.legs.iter().filter(|l| matches!(l, Leg::Drive(_))).count();
+    [drives, trajectory.legs.len() - drives]
 }
 
 fn bound(set: &SceneSet, scene: &Scene, robot: &RobotModel) -> (f64, f64) {

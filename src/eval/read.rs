@@ -53,7 +53,8 @@ pub fn read(file: &str, text: &str) -> Result<SceneSet, Diagnostics> {
     }
     // Too large a grid is refused before the first scene, not in its midst.
     VoxelMap::from_boxes(set.bounds, set.resolution, &[], Unknown::Occupied).map_err(|mut diagnostics| {
-        diagnostics.0.iter_mut().for_each(|d| d.file = Some(file.into()));
+        let hint = "choose a larger `resolution` or smaller `bounds`";
+        diagnostics.0.iter_mut().for_each(|d| (d.file, d.hint) = (Some(file.into()), Some(hint.into())));
         diagnostics
     })?;
     Ok(set)

@@ -56,7 +56,7 @@ fn table1(judged: &[Judged]) -> String {
         cells
     };
     let change = |from: [f64; 6], to: [f64; 6]| {
-        std::array::from_fn::<_, 6, _>(|i| 100.0 * (to[i] / from[i] - 1.0)).map(|c| format!("{c:+.0} %")).to_vec()
+        std::array::from_fn::<_, 6, _>(|i| 100.0 * (to[i] / from[i] - 1.0)).map(percent).to_vec()
     };
     let initial = means(certified(judged).filter_map(|j| j.initial));
     let planned = means(certified(judged).filter_map(|j| j.planned));
@@ -70,6 +70,10 @@ fn table1(judged: &[Judged]) -> String {
     table.row("ours, change", change(initial, planned));
     table.row("ours, as commanded", three(driven));
     table.render()
+}
+
+fn percent(change: f64) -> String {
+    if change.is_finite() { format!("{change:+.0} %") } else { "-".into() }
 }
 
 fn table2(judged: &[Judged], without_dense: &[Judged]) -> String {

@@ -41,7 +41,7 @@ fn every_fault_is_named_with_its_place() {
         ("\"schema\": \"trajc.scenes/1\", ", "", "`schema` is missing"),
         ("\"resolution\": 0.05, ", "", "`resolution` is missing"),
         ("\"resolution\": 0.05", "\"resolution\": 0", "`resolution` must be between"),
-        ("\"resolution\": 0.05", "\"resolution\": 0.0002", "larger cell"),
+        ("\"resolution\": 0.05", "\"resolution\": 0.0002", "larger `resolution`"),
         ("\"clearance_m\"", "\"clearance\"", "unknown key `clearance`"),
         ("\"reverse\": true", "\"reverse\": \"yes\"", "`reverse` must be true or false, found \"yes\""),
         ("\"reverse\": true", "\"reverse\": true, \"reverse\": false", "`reverse` is given twice"),
