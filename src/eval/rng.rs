@@ -31,7 +31,7 @@ impl Rng {
         debug_assert!(low <= high);
         let count = u128::from(high.abs_diff(low)) + 1;
         // The bias of the multiplication is below 2^-32.
-        low + (u128::from(self.next()) * count >> 64) as i32
+        low + ((u128::from(self.next()) * count) >> 64) as i32
     }
 
     /// Uniform over `[low, high)`.
