@@ -19,7 +19,7 @@
 //! | [`report`] | [`report::Report`] | the nouns above |
 //! | [`emit`] | bytes | `CommandTable`, `Report` |
 //!
-//! Above all stages are [`math`], [`geom`] and [`diag`]; below them [`pipeline`] and [`cli`]. Only `cli` opens files: stages take
+//! Above all stages are [`math`], [`geom`] and [`diag`]; below them [`pipeline`], [`eval`] (suites of scenes) and [`cli`]. Only `cli` opens files: stages take
 //! text and bytes, so a mission can be compiled from memory.
 //!
 //! # Example
@@ -112,6 +112,7 @@ pub mod command;
 pub mod diag;
 pub mod emit;
 pub mod esdf;
+pub mod eval;
 pub mod geom;
 pub mod map;
 pub mod math;

@@ -59,10 +59,18 @@ pub struct Inputs {
 }
 
 /// What may differ from the mission.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CompileOptions {
     /// Instead of the mission's, s.
     pub sampling_time: Option<f64>,
+    /// Dense sampling in the optimiser (\[SCR\] section IV-C). Default true.
+    pub dense: bool,
+}
+
+impl Default for CompileOptions {
+    fn default() -> Self {
+        Self { sampling_time: None, dense: true }
+    }
 }
 
 /// How a run of a mission ended.
@@ -81,6 +89,8 @@ pub struct Outcome {
 pub struct Compiled {
     /// The robot, with the mission's limits.
     pub robot: RobotModel,
+    /// What the commands follow.
+    pub trajectory: Trajectory,
     /// The commands.
     pub commands: CommandTable,
     /// The proof.
@@ -170,7 +180,7 @@ fn stages(
     let finish = Finish { mission, robot, map: map.as_ref(), sampling_time };
     let made = match (given, map) {
         (Some(trajectory), _) => finish.certify(run, trajectory)?,
-        (None, Some(map)) => plan(run, &finish, map)?,
+        (None, Some(map)) => plan(run, &finish, map, options.dense)?,
         (None, None) => {
             let message = "the mission has neither a map nor a path of its own";
             return Err(Diagnostic::error("mission/no-map", message).into());
@@ -192,7 +202,7 @@ fn stages(
         let rows = run.stage("path_error", || finish.path_errors(&profile, &trajectory));
         run.report.path_error = rows?;
     }
-    Ok(Compiled { robot: robot.clone(), commands, certificate })
+    Ok(Compiled { robot: robot.clone(), trajectory, commands, certificate })
 }
 
 /// The robot and the map, checked against what the mission says of them.
@@ -272,7 +282,7 @@ impl Made {
 }
 
 /// Searches and optimises until something is certified; the search's own path is the last try.
-fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap) -> Result<Made, Diagnostics> {
+fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, dense: bool) -> Result<Made, Diagnostics> {
     let (mission, robot) = (finish.mission, finish.robot);
     let field = run.stage("esdf", || esdf::build(map));
     let query = query(mission, robot);
@@ -291,7 +301,7 @@ fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap) -> Result<Made, 
         return finish.certify(run, path.trajectory());
     }
     for margin in OPTIMISER_MARGINS {
-        let options = OptimizeOptions { clearance: mission.clearance + margin, ..Default::default() };
+        let options = OptimizeOptions { clearance: mission.clearance + margin, dense, ..Default::default() };
         let trajectory = run.stage("optimize", || optimize::optimize(&path, &field, robot, &options));
         // A trajectory that no law can time is one more reason to go on to the next try.
         if let Ok(made) = finish.certify(run, trajectory).map_err(drop).and_then(Made::if_certified) {

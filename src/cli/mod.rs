@@ -4,6 +4,7 @@
 pub mod check;
 pub mod compile;
 pub mod completions;
+pub mod eval;
 pub mod inputs;
 pub mod inspect;
 pub mod output;
@@ -39,6 +40,7 @@ enum Command {
     Check(check::CheckArgs),
     PathError(path_error::PathErrorArgs),
     Inspect(inspect::InspectArgs),
+    Eval(eval::EvalArgs),
     Schema(schema::SchemaArgs),
     /// Print a shell's completion script, such as for `source <(trajc completions bash)`.
     Completions {
@@ -63,6 +65,7 @@ pub fn main() -> u8 {
         Command::Check(args) => check::check(args, &mut terminal),
         Command::PathError(args) => path_error::path_error(args, &mut terminal),
         Command::Inspect(args) => inspect::inspect(args, &mut terminal),
+        Command::Eval(args) => eval::eval(args, &mut terminal),
         Command::Schema(args) => schema::schema(args, &mut terminal),
         Command::Completions { shell } => {
             terminal.print(&completions::text(*shell, &mut Args::command()));

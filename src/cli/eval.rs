@@ -1,0 +1,278 @@
+//! `trajc eval`.
+
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::inputs::{self, Disk};
+use super::output;
+use super::terminal::Terminal;
+use crate::diag::{Diagnostic, Diagnostics};
+use crate::emit::csv::{self, CsvHeader};
+use crate::eval::{self, Judged, SceneSet, Suite, figures, tables};
+use crate::pipeline::{CompileOptions, Outcome, TextFile};
+use crate::report::schema::{InputFile, InputsPart};
+use crate::robot::{self, Files, RobotInputs, RobotModel, spec};
+
+/// Compile many scenes and print the paper's tables beside what came out.
+///
+/// The scenes are those of a suite, drawn from a seed, or of a file (format trajc.scenes/1). They run one after the other on one
+/// core. Success means certified. Exit 0: every scene was judged, failed ones too. 2: bad input.
+#[derive(Debug, clap::Args)]
+#[command(group(clap::ArgGroup::new("what").required(true).args(["suite", "scenes"])))]
+pub struct EvalArgs {
+    /// Draw the scenes of this table of [SCR].
+    #[arg(long)]
+    suite: Option<Suite>,
+    /// Read the scenes from a file.
+    #[arg(long, value_name = "FILE.json")]
+    scenes: Option<PathBuf>,
+    /// Robot: a folder, a robot.yaml or a .urdf [default: scr_db for table1, box_base for table2 and table3].
+    #[arg(long, value_name = "PATH")]
+    robot: Option<PathBuf>,
+    /// Scenes for each number of boxes [default: the paper's 500 or 200]; of a file: the first N [default: all].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=5000))]
+    count: Option<u32>,
+    /// Seed of a suite.
+    #[arg(long, value_name = "SEED", default_value_t = 1, conflicts_with = "scenes")]
+    seed: u64,
+    /// Boxes a scene, for table3 [default: 10,20,35].
+    #[arg(long, value_name = "N", value_delimiter = ',', conflicts_with = "scenes",
+          value_parser = clap::value_parser!(u16).range(1..=60))]
+    boxes: Vec<u16>,
+    /// Also write the suite's scenes to a file.
+    #[arg(long, value_name = "FILE.json", conflicts_with = "scenes")]
+    write_scenes: Option<PathBuf>,
+    /// Write DIR/ID/commands.csv and report.json of each certified scene.
+    #[arg(long, value_name = "DIR")]
+    write_commands: Option<PathBuf>,
+    /// Print the milliseconds of each stage too.
+    #[arg(long)]
+    profile: bool,
+    /// Print figures as JSON instead of tables.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Robots that suites run with where none is named: name, robot.yaml, URDF.
+const SCR_DB: [&str; 3] =
+    ["scr_db", include_str!("../../robots/scr_db/robot.yaml"), include_str!("../../robots/scr_db/scr_db.urdf")];
+const BOX_BASE: [&str; 3] =
+    ["box_base", include_str!("../../robots/box_base/robot.yaml"), include_str!("../../robots/box_base/box_base.urdf")];
+
+/// Runs the scenes and prints.
+///
+/// # Errors
+/// Bad input: scenes, robot, or a folder that cannot be written.
+pub fn eval(args: &EvalArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics> {
+    let disk = Disk::default();
+    let (set, text) = scenes(args, &disk)?;
+    let suite = Suite::of(&set);
+    let loaded = Loaded::read(args, &set, suite, &disk)?;
+    set.fits(&loaded.robot)?;
+    if let Some(path) = &args.write_scenes {
+        write_file(path, text.text.as_bytes())?;
+    }
+    let writer = args.write_commands.as_deref().map(|folder| Writer::new(folder, &set, &text, &loaded));
+    let runs = if suite == Some(Suite::Table2) { 2 } else { 1 };
+    let bar = progress(terminal, runs * set.scenes.len());
+    let run = |dense: bool, writer: Option<&Writer<'_>>| -> Result<Vec<Judged>, Diagnostics> {
+        let options = CompileOptions { dense, ..CompileOptions::default() };
+        let judge = |scene| {
+            let (judged, outcome) = eval::judge(&set, scene, &loaded.robot, &options)?;
+            if let Some(writer) = writer {
+                writer.write(&judged, outcome)?;
+            }
+            bar.inc(1);
+            Ok(judged)
+        };
+        set.scenes.iter().map(judge).collect()
+    };
+    let judged = run(true, writer.as_ref())?;
+    let without_dense = if runs == 2 { run(false, None)? } else { Vec::new() };
+    bar.finish_and_clear();
+    if args.json {
+        terminal.print(&figures::document(&set, suite, &judged, &without_dense));
+        return Ok(0);
+    }
+    let mut out = tables::render(suite, &judged, &without_dense) + "\n" + &tables::render_totals(&judged);
+    if args.profile {
+        out += &format!("\n{}", tables::render_profile(&judged));
+    }
+    terminal.print(&out);
+    Ok(0)
+}
+
+/// The set, and the text it was read from.
+fn scenes(args: &EvalArgs, disk: &Disk) -> Result<(SceneSet, TextFile), Diagnostics> {
+    let count = args.count.map(|n| n as usize);
+    let text = match (&args.scenes, args.suite) {
+        (Some(path), _) => {
+            if std::fs::metadata(path).is_ok_and(|m| m.len() > eval::LONGEST as u64) {
+                let message = format!("scenes of more than {} MiB", eval::LONGEST >> 20);
+                let hint = "split the file: scenes do not depend on each other";
+                return Err(Diagnostic::error("scenes/too-long", message)
+                    .file(path.display().to_string())
+                    .hint(hint)
+                    .into());
+            }
+            disk.text(path, None)?
+        }
+        (None, suite) => {
+            let suite = suite.unwrap_or(Suite::Table1);
+            let name = match &args.write_scenes {
+                Some(path) => path.display().to_string(),
+                None => format!("{} --seed {}", suite.name(), args.seed),
+            };
+            TextFile { name, text: generate(args, suite, count.unwrap_or(eval::default_count(suite)))? }
+        }
+    };
+    let mut set = eval::read(&text.name, &text.text)?;
+    if args.scenes.is_some() {
+        set.scenes.truncate(count.unwrap_or(usize::MAX));
+    }
+    Ok((set, text))
+}
+
+fn generate(args: &EvalArgs, suite: Suite, count: usize) -> Result<String, Diagnostics> {
+    if !args.boxes.is_empty() && suite != Suite::Table3 {
+        let message = format!("`--boxes` is for table3; {} has its own number", suite.name());
+        return Err(Diagnostic::error("eval/boxes", message).hint("leave `--boxes` out").into());
+    }
+    let mut boxes: Vec<usize> = args.boxes.iter().map(|n| usize::from(*n)).collect();
+    boxes.sort_unstable();
+    boxes.dedup();
+    let boxes = if boxes.is_empty() { eval::default_boxes(suite) } else { &boxes };
+    eval::document(suite, boxes, count, args.seed).map_err(|boxes| {
+        let message = format!("found no room for {boxes} boxes and a way between them");
+        Diagnostic::error("eval/boxes", message).hint("ask for fewer with `--boxes`").into()
+    })
+}
+
+/// The robot with the set's limits, and what it was read from.
+struct Loaded {
+    robot: RobotModel,
+    /// As the command header names it.
+    name: String,
+    inputs: Vec<InputFile>,
+}
+
+impl Loaded {
+    fn read(args: &EvalArgs, set: &SceneSet, suite: Option<Suite>, disk: &Disk) -> Result<Self, Diagnostics> {
+        let (name, (spec, yaml, urdf)) = match (&args.robot, suite) {
+            (Some(path), _) => {
+                let path = robot_file(path)?;
+                (path.display().to_string(), inputs::read_robot_files(&path, disk, None)?)
+            }
+            (None, Some(Suite::Table1)) => built_in(&SCR_DB)?,
+            (None, Some(_)) => built_in(&BOX_BASE)?,
+            (None, None) => {
+                let message = "these scenes belong to no suite by their `name`, so they need `--robot`";
+                let hint = "for example `--robot robots/scr_db`";
+                return Err(Diagnostic::error("eval/no-robot", message).file(set.file.clone()).hint(hint).into());
+            }
+        };
+        let mut files: Box<dyn Files> = Box::new(disk.clone());
+        let robot = robot::parse(RobotInputs {
+            spec: &spec,
+            urdf: (&urdf.name, &urdf.text),
+            files: files.as_mut(),
+            overrides: &set.limits,
+        })?;
+        let inputs = yaml.iter().chain([&urdf]).map(|f| InputFile::new(f.name.clone(), f.text.as_bytes())).collect();
+        Ok(Self { robot, name, inputs })
+    }
+}
+
+/// A folder means its robot.yaml, or the one URDF in it.
+fn robot_file(path: &Path) -> Result<PathBuf, Diagnostics> {
+    if !path.is_dir() {
+        return Ok(path.to_path_buf());
+    }
+    let yaml = path.join("robot.yaml");
+    if yaml.is_file() {
+        return Ok(yaml);
+    }
+    let urdf = |p: &PathBuf| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("urdf"));
+    let entries = std::fs::read_dir(path).into_iter().flatten().flatten();
+    let found: Vec<PathBuf> = entries.map(|e| e.path()).filter(urdf).collect();
+    match &found[..] {
+        [one] => Ok(one.clone()),
+        _ => {
+            let message = format!("folder `{}` has no robot.yaml and {} .urdf files", path.display(), found.len());
+            Err(Diagnostic::error("eval/robot-folder", message).hint("name the robot's file").into())
+        }
+    }
+}
+
+fn built_in([name, yaml, urdf]: &[&str; 3]) -> Result<(String, inputs::RobotFiles), Diagnostics> {
+    let file = |name: String, text: &str| TextFile { name, text: text.to_owned() };
+    let yaml = file(format!("robots/{name}/robot.yaml"), yaml);
+    let parsed = spec::parse(&yaml.name, &yaml.text)?;
+    let urdf = file(format!("robots/{name}/{name}.urdf"), urdf);
+    Ok((yaml.name.clone(), (parsed, Some(yaml), urdf)))
+}
+
+/// A bar on a terminal; nothing elsewhere.
+fn progress(terminal: &Terminal, scenes: usize) -> ProgressBar {
+    if terminal.quiet || !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new(scenes as u64);
+    let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} scenes, {eta} left");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar
+}
+
+fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Diagnostics> {
+    std::fs::write(path, bytes).map_err(|error| {
+        let message = format!("cannot write `{}`: {error}", path.display());
+        Diagnostic::error("output/io", message).hint("the folder must exist and be writable").into()
+    })
+}
+
+/// Writes commands and reports of certified scenes, and removes older ones of those that failed.
+struct Writer<'a> {
+    folder: &'a Path,
+    set: &'a SceneSet,
+    robot: String,
+    hash: String,
+    inputs: InputsPart,
+}
+
+impl<'a> Writer<'a> {
+    fn new(folder: &'a Path, set: &'a SceneSet, text: &TextFile, loaded: &Loaded) -> Self {
+        let scenes = InputFile::new(text.name.clone(), text.text.as_bytes());
+        let mut hasher = blake3::Hasher::new();
+        for file in std::iter::once(&scenes).chain(&loaded.inputs) {
+            hasher.update(file.blake3.as_bytes());
+        }
+        let (robot, other) = match loaded.inputs.split_first() {
+            Some((first, rest)) => (Some(first.clone()), rest.to_vec()),
+            None => (None, Vec::new()),
+        };
+        let inputs = InputsPart { mission: scenes, robot, map: None, other };
+        Self { folder, set, robot: loaded.name.clone(), hash: hasher.finalize().to_hex().to_string(), inputs }
+    }
+
+    fn write(&self, judged: &Judged, mut outcome: Outcome) -> Result<(), Diagnostics> {
+        let Some(compiled) = &outcome.compiled else {
+            return Ok(output::discard(self.folder, &judged.id)?);
+        };
+        let mission = format!("{}#{}", self.set.file, judged.id);
+        let header = CsvHeader {
+            mission: mission.clone(),
+            robot: self.robot.clone(),
+            map: None,
+            inputs_blake3: self.hash.clone(),
+        };
+        let commands = csv::write(&compiled.commands, &header);
+        outcome.report.inputs = self.inputs.clone();
+        outcome.report.inputs.mission.path = mission;
+        let report = outcome.report.to_json();
+        let files = [("commands.csv", commands.as_bytes()), ("report.json", report.as_bytes())];
+        output::publish(self.folder, &judged.id, &files)?;
+        Ok(())
+    }
+}

@@ -1,0 +1,60 @@
+//! `trajc eval`: many scenes through the whole pipeline, and the papers' tables beside.
+//!
+//! [`document`] makes the suites of \[SCR\] section VI, [`read()`] reads `trajc.scenes/1`, [`judge`] compiles one scene,
+//! [`tables`] prints what came out beside the paper's own rows, [`figures`] says it in JSON.
+
+mod bound;
+mod excess;
+mod fault;
+pub mod figures;
+mod generate;
+mod json;
+mod judge;
+pub mod paper;
+mod read;
+mod rng;
+mod room;
+mod scenes;
+mod statistics;
+pub mod tables;
+mod text_table;
+
+pub use bound::travel_time;
+pub use excess::AlphaExcess;
+pub use fault::ScenesError;
+pub use generate::{default_boxes, default_count, document};
+pub use judge::{Judged, judge};
+pub use read::{LONGEST, read};
+pub use scenes::{SCHEMA, Scene, SceneSet};
+pub use statistics::Summary;
+
+/// The suites of \[SCR\] section VI.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Suite {
+    /// Cubes and arch bridges, 10 x 10 x 1 m: before and after optimisation.
+    Table1,
+    /// 20 boxes, 10 x 10 x 0.4 m: with and without dense sampling.
+    Table2,
+    /// 10, 20 and 35 boxes, start and goal more than 5 m apart: against other planners.
+    Table3,
+}
+
+impl Suite {
+    /// `table1`, `table2` or `table3`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Table1 => "table1",
+            Self::Table2 => "table2",
+            Self::Table3 => "table3",
+        }
+    }
+
+    /// The suite that a set of scenes belongs to by its name, such as `table3-35`.
+    pub fn of(set: &SceneSet) -> Option<Self> {
+        let of = |suite: &Self| {
+            let rest = set.name.strip_prefix(suite.name());
+            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
+        };
+        [Self::Table1, Self::Table2, Self::Table3].into_iter().find(of)
+    }
+}

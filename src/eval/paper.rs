@@ -1,0 +1,89 @@
+//! The papers' own figures, as printed in \[SCR\] Tables I to III, and those of DDR-opt, the same first author's newer planner, on
+//! scenes of Table III at the limits used here.
+
+/// Table I: M_j m/s^3, M_a m/s^2, M_alpha rad/s^2, length m, time s, M_mj rad/s^3.
+pub const TABLE1_INITIAL: [f64; 6] = [0.614, 0.428, 2.683, 8.870, 9.516, 2.000];
+/// The same, optimised.
+pub const TABLE1_OPTIMISED: [f64; 6] = [0.193, 0.370, 0.724, 8.508, 10.196, 0.294];
+/// Table I: scenes that succeed, %, and mean computation time, ms.
+pub const TABLE1_SUCCESS: (f64, f64) = (93.0, 104.2);
+
+/// A row of Table II.
+pub struct DenseRow {
+    /// Trajectories of 200 whose alpha exceeds its limit by less than 10 %, less than 25 %, more than 25 %.
+    pub counts: [f64; 3],
+    /// Time above the limit, %.
+    pub time_above: f64,
+    /// ms.
+    pub computation: f64,
+}
+
+/// Without dense sampling.
+pub const TABLE2_WITHOUT: DenseRow = DenseRow { counts: [10.0, 72.0, 128.0], time_above: 4.36, computation: 131.8 };
+/// With dense sampling.
+pub const TABLE2_WITH: DenseRow = DenseRow { counts: [152.0, 165.0, 35.0], time_above: 2.24, computation: 64.8 };
+/// Trajectories of Table II.
+pub const TABLE2_COUNT: f64 = 200.0;
+
+/// A planner's row of Table III.
+pub struct PlannerRow {
+    /// Boxes a scene.
+    pub boxes: usize,
+    /// Whose.
+    pub planner: &'static str,
+    /// m/s^3; two values are the range over all three densities.
+    pub jerk: [f64; 2],
+    /// rad/s^2; likewise.
+    pub alpha: [f64; 2],
+    /// ms.
+    pub computation: f64,
+    /// m and s, where given.
+    pub length_time: Option<(f64, f64)>,
+    /// s/m.
+    pub pace: f64,
+}
+
+const fn scr(
+    boxes: usize,
+    planner: &'static str,
+    jerk: f64,
+    alpha: f64,
+    ct_s: f64,
+    length: f64,
+    time: f64,
+) -> PlannerRow {
+    PlannerRow {
+        boxes,
+        planner,
+        jerk: [jerk; 2],
+        alpha: [alpha; 2],
+        computation: ct_s * 1e3,
+        length_time: Some((length, time)),
+        pace: time / length,
+    }
+}
+
+const fn ddr_opt(boxes: usize, computation: f64, pace: f64) -> PlannerRow {
+    PlannerRow {
+        boxes,
+        planner: "DDR-opt",
+        jerk: [0.72, 0.80],
+        alpha: [0.69, 0.75],
+        computation,
+        length_time: None,
+        pace,
+    }
+}
+
+/// Table III. The paper states no limits of speed; DDR-opt's rows are at those of the scenes here.
+pub const TABLE3: [PlannerRow; 9] = [
+    scr(10, "paper, proposed", 0.554, 0.503, 0.051, 7.822, 9.355),
+    scr(10, "paper, TEB", 7.794, 1.684, 6.287, 7.945, 5.184),
+    ddr_opt(10, 50.0, 1.47),
+    scr(20, "paper, proposed", 0.550, 0.548, 0.053, 7.720, 9.585),
+    scr(20, "paper, TEB", 5.899, 1.753, 7.578, 7.794, 5.412),
+    ddr_opt(20, 47.0, 1.49),
+    scr(35, "paper, proposed", 0.574, 0.598, 0.058, 7.656, 10.332),
+    scr(35, "paper, TEB", 6.987, 1.845, 20.208, 7.778, 5.855),
+    ddr_opt(35, 49.0, 1.49),
+];

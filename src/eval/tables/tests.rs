@@ -1,0 +1,88 @@
+//! Tables of scenes made up.
+
+use super::*;
+
+fn scene(id: &str, boxes: usize, time: f64, alpha: f64) -> Judged {
+    let metrics = Metrics { length_m: 5.0, time_s: time, mean_jerk_mps3: 0.5, ..Metrics::default() };
+    let excess = Some(AlphaExcess { peak: alpha, share: 0.1 });
+    Judged {
+        id: id.into(),
+        boxes,
+        certified: true,
+        failure: None,
+        source: Some("optimised".into()),
+        legs: Some([1, 0]),
+        expanded: Some(3),
+        iterations: Some(9),
+        ending: Some("converged".into()),
+        initial: Some(Metrics { mean_jerk_mps3: 1.0, ..metrics }),
+        planned: Some(metrics),
+        driven: Some(metrics),
+        alpha_planned: excess,
+        alpha_driven: excess,
+        clearance_proven: Some(0.03),
+        bound: (4.0, 5.0),
+        timings: vec![("search", 2.0), ("optimize", 3.0), ("certify", 1.0)],
+    }
+}
+
+#[test]
+fn table_one_has_the_papers_rows_and_the_change() {
+    let text = render(Some(Suite::Table1), &[scene("a", 15, 6.0, 1.0)], &[]);
+    let row = |name: &str| text.lines().find(|l| l.trim().starts_with(name)).unwrap_or_default().to_owned();
+    assert!(row("paper, initial").contains("0.614") && row("paper, optimised").ends_with("93.0  104.2"), "{text}");
+    assert!(row("paper, change").contains("-69 %") && row("paper, change").contains("-85 %"), "{text}");
+    assert!(row("ours, change").contains("-50 %") && row("ours, optimised").ends_with("100.0    5.0"), "{text}");
+}
+
+#[test]
+fn table_two_counts_thresholds_cumulatively_as_the_paper_does() {
+    let peaks = [0.9, 1.05, 1.2, 1.3].map(|peak| AlphaExcess { peak, share: 0.02 });
+    let row = ExcessRow::of(&peaks);
+    assert_eq!((row.above_1, row.below_10, row.below_25, row.above_25), (75.0, 50.0, 75.0, 25.0));
+    assert!((row.time_above - 2.0).abs() < 1e-12);
+    let text = render(Some(Suite::Table2), &[scene("a", 20, 6.0, 1.0)], &[scene("a", 20, 6.0, 1.3)]);
+    assert!(
+        text.contains("76.0") && text.contains("64.0") && text.contains("ours, as commanded, without DS"),
+        "{text}"
+    );
+}
+
+#[test]
+fn table_three_groups_by_boxes_beside_the_papers_rows() {
+    let judged = [scene("a", 10, 6.0, 1.0), scene("b", 35, 7.0, 1.0), scene("c", 10, 8.0, 1.0)];
+    let text = render(Some(Suite::Table3), &judged, &[]);
+    let ours: Vec<&str> = text.lines().filter(|l| l.contains("trajc")).collect();
+    assert_eq!(ours.len(), 2, "{text}");
+    assert!(ours[0].contains("1.400") && ours[0].contains("1.250") && ours[0].ends_with("2/2"), "{text}");
+    assert!(text.contains("DDR-opt") && text.contains("20208.0") && !text.contains("20 paper"), "{text}");
+    assert!(!render(None, &judged, &[]).contains("paper"));
+}
+
+#[test]
+fn failures_and_fall_backs_are_named() {
+    let mut failed = scene("bad", 10, 6.0, 1.0);
+    failed.certified = false;
+    failed.failure = Some(crate::report::schema::Failure {
+        stage: "search".into(),
+        reason: "start is blocked".into(),
+        code: "search/start-blocked".into(),
+        numbers: Default::default(),
+    });
+    let mut fallen = scene("fallen", 10, 6.0, 1.0);
+    fallen.source = Some("search".into());
+    let text = render_totals(&[failed, fallen, scene("good", 10, 6.0, 1.0)]);
+    assert!(text.starts_with("2 of 3 certified (66.7 %), 1 of them by the search's own path\n"), "{text}");
+    assert!(text.contains("search + optimise: median 5.0 ms") && text.contains("certify: median 1.0 ms"), "{text}");
+    assert!(text.ends_with("by the search's own path: fallen\nfailed: bad (search): start is blocked\n"), "{text}");
+}
+
+#[test]
+fn nothing_certified_is_a_table_of_dashes() {
+    let mut failed = scene("bad", 10, 6.0, 1.0);
+    failed.certified = false;
+    for suite in [Some(Suite::Table1), Some(Suite::Table2), Some(Suite::Table3), None] {
+        assert!(!render(suite, &[failed.clone()], &[failed.clone()]).contains("NaN"));
+    }
+    assert!(render_profile(&[failed]).contains("optimize"));
+}

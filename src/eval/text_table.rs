@@ -1,0 +1,52 @@
+//! Columns of figures as text.
+
+/// A table: a head and rows; the first column stands left, the others right.
+pub(super) struct TextTable {
+    title: String,
+    rows: Vec<Vec<String>>,
+}
+
+impl TextTable {
+    pub fn new(title: impl Into<String>, head: &[&str]) -> Self {
+        Self { title: title.into(), rows: vec![head.iter().map(|h| (*h).to_owned()).collect()] }
+    }
+
+    pub fn row(&mut self, name: impl Into<String>, cells: impl IntoIterator<Item = String>) {
+        self.rows.push(std::iter::once(name.into()).chain(cells).collect());
+    }
+
+    pub fn render(&self) -> String {
+        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
+        let width = |c: usize| self.rows.iter().filter_map(|r| r.get(c)).map(|t| t.chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..columns).map(width).collect();
+        let mut text = format!("{}\n", self.title);
+        for row in &self.rows {
+            let mut line = String::from(" ");
+            for (c, cell) in row.iter().enumerate() {
+                let pad = " ".repeat(widths[c] - cell.chars().count());
+                line += &if c == 0 { format!(" {cell}{pad}") } else { format!("  {pad}{cell}") };
+            }
+            text += line.trim_end();
+            text.push('\n');
+        }
+        text
+    }
+}
+
+/// A number with that many decimals; `-` for NaN.
+pub(super) fn fixed(value: f64, decimals: usize) -> String {
+    if value.is_nan() { "-".into() } else { format!("{value:.decimals$}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_line_up() {
+        let mut table = TextTable::new("T", &["", "M_α", "time s"]);
+        table.row("paper", [fixed(0.5, 2), fixed(10.0, 1)]);
+        table.row("ours, now", [fixed(f64::NAN, 2)]);
+        assert_eq!(table.render(), "T\n              M_α  time s\n  paper      0.50    10.0\n  ours, now     -\n");
+    }
+}
