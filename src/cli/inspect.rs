@@ -21,7 +21,7 @@ pub struct InspectArgs {
     #[arg(long, value_name = "M", default_value_t = 0.05)]
     resolution: f64,
     /// Slab of a map that holds obstacles, in metres.
-    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 2, default_values_t = [0.02, 2.0])]
+    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', allow_hyphen_values = true, default_values_t = [0.02, 2.0])]
     height: Vec<f64>,
 }
 
@@ -88,11 +88,15 @@ fn of_robot(path: &Path) -> Result<String, Diagnostics> {
 }
 
 fn of_map(args: &InspectArgs, path: &Path) -> Result<String, Diagnostics> {
-    let height = [args.height[0], args.height[1]];
-    if !(height[0] < height[1] && args.resolution > 0.0) {
-        let message = format!("--height {} {} is no slab", height[0], height[1]);
-        return Err(Diagnostic::error("inspect/height", message).hint("give the lower end first, metres").into());
-    }
+    let height = match args.height[..] {
+        [low, high] if low.is_finite() && high.is_finite() && low < high => [low, high],
+        _ => {
+            let written: Vec<String> = args.height.iter().map(f64::to_string).collect();
+            let message = format!("--height {} is no slab", written.join(","));
+            let hint = "give two ends in metres, the lower first, such as --height 0.02,2";
+            return Err(Diagnostic::error("inspect/height", message).hint(hint).into());
+        }
+    };
     let file = read_map_file(path, &Disk::default(), None)?;
     let points =
         !["yaml", "yml", "npy"].iter().any(|e| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(e)));
