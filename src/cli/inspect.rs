@@ -15,13 +15,13 @@ use crate::robot::{self, RobotInputs};
 /// Print what the program understood of a URDF, robot.yaml, map, mission or command file.
 #[derive(Debug, clap::Args)]
 pub struct InspectArgs {
-    /// A .urdf, robot.yaml, mission, map, commands.csv or commands.mcap.
+    /// .urdf, robot.yaml, a mission, a map, commands.csv or commands.mcap.
     file: PathBuf,
-    /// Cell size in metres, for a point cloud.
+    /// Cell size of point clouds, in metres.
     #[arg(long, value_name = "M", default_value_t = 0.05)]
     resolution: f64,
-    /// Heights in metres between which a map's points are obstacles: two numbers, the lower first.
-    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', default_values_t = [0.02, 2.0])]
+    /// Slab of a map that holds obstacles, in metres.
+    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', allow_hyphen_values = true, default_values_t = [0.02, 2.0])]
     height: Vec<f64>,
 }
 
@@ -88,15 +88,15 @@ fn of_robot(path: &Path) -> Result<String, Diagnostics> {
 }
 
 fn of_map(args: &InspectArgs, path: &Path) -> Result<String, Diagnostics> {
-    let &[low, high] = args.height.as_slice() else {
-        let message = format!("--height needs two numbers, found {}", args.height.len());
-        return Err(Diagnostic::error("inspect/height", message).hint("for example --height 0.02,1.0").into());
+    let height = match args.height[..] {
+        [low, high] if low.is_finite() && high.is_finite() && low < high => [low, high],
+        _ => {
+            let written: Vec<String> = args.height.iter().map(f64::to_string).collect();
+            let message = format!("--height {} is no slab", written.join(","));
+            let hint = "give two ends in metres, the lower first, such as --height 0.02,2";
+            return Err(Diagnostic::error("inspect/height", message).hint(hint).into());
+        }
     };
-    let height = [low, high];
-    if !(low < high && args.resolution > 0.0) {
-        let message = format!("--height {low},{high} is no slab");
-        return Err(Diagnostic::error("inspect/height", message).hint("give the lower end first, metres").into());
-    }
     let file = read_map_file(path, &Disk::default(), None)?;
     let points =
         !["yaml", "yml", "npy"].iter().any(|e| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(e)));

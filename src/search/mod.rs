@@ -131,7 +131,7 @@ pub enum SearchError {
     /// Every state that can be reached was looked at.
     #[error(
         "no way to the goal: all {expanded} states that can be reached on the lattice (5 cm, 5 degrees, 64 postures a joint) \
-         were searched{}", narrowest_way(.narrowest)
+         were searched{}", narrowest_way(.narrowest, *.core)
     )]
     Exhausted {
         /// States expanded.
@@ -167,11 +167,16 @@ fn blocked(contact: &Contact, clearance: f64) -> String {
     }
 }
 
-fn narrowest_way(narrowest: &Option<(f64, [f64; 2])>) -> String {
+fn narrowest_way(narrowest: &Option<(f64, [f64; 2])>, core: f64) -> String {
     match narrowest {
-        Some((radius, [x, y])) => {
-            format!("; the widest way there narrows to {:.2} m about ({x:.2}, {y:.2})", 2.0 * radius.max(0.0))
+        Some((radius, [x, y])) if *radius > 0.0 => {
+            format!(
+                "; the widest way there narrows to {:.2} m about ({x:.2}, {y:.2}), the base needs {:.2} m",
+                2.0 * radius,
+                2.0 * core
+            )
         }
+        Some(_) => "; the goal is closed off even for a point".to_owned(),
         None => String::new(),
     }
 }
@@ -189,7 +194,7 @@ impl Describe for SearchError {
             Self::StartBlocked { contact: c, clearance } => contact("search/start-blocked", c, *clearance),
             Self::GoalBlocked { contact: c, clearance } => contact("search/goal-blocked", c, *clearance),
             Self::OffMap { which, x, y, .. } => Diagnostic::failure("search/off-map", self)
-                .hint("poses are in the map's frame, metres; `map: {unknown: free}` lets the robot leave the seen area")
+                .hint("poses are in the map's frame, metres; the search stays within the map's rectangle, also with `unknown: free`")
                 .number("pose", *which)
                 .number("x_m", *x)
                 .number("y_m", *y),

@@ -3,7 +3,8 @@
 use crate::geom::Aabb;
 use crate::map::VoxelMap;
 
-/// Appends boxes that cover exactly the occupied cells that meet `region`: runs of cells along z, equal runs joined along y.
+/// Appends boxes that cover exactly the occupied cells that meet `region`: runs of cells along z, equal runs joined along y,
+/// equal rectangles joined along x.
 pub(super) fn collect(map: &VoxelMap, region: &Aabb, out: &mut Vec<Aabb>) {
     let range = |axis: usize| {
         let cell = |v: f64| ((v - map.origin[axis]) / map.resolution).floor();
@@ -15,40 +16,67 @@ pub(super) fn collect(map: &VoxelMap, region: &Aabb, out: &mut Vec<Aabb>) {
     if zs.is_empty() {
         return;
     }
-    let mut open: Vec<OpenRun> = Vec::new();
-    let mut next: Vec<OpenRun> = Vec::new();
-    for i in xs {
-        open.clear();
-        for j in ys.clone() {
-            let column = map.column(i, j);
-            if open.is_empty() && column.iter().all(|word| *word == 0) {
-                continue;
+    let (mut open, mut next) = (Vec::new(), Vec::new());
+    // Rectangles of this layer and of the one before, the latter with the layer that they began in.
+    let mut layer: Vec<Rectangle> = Vec::new();
+    let mut before: Vec<(Rectangle, usize)> = Vec::new();
+    for i in xs.clone() {
+        layer.clear();
+        rectangles(map, i, ys.clone(), zs.clone(), [&mut open, &mut next], &mut layer);
+        before.retain(|(rectangle, since)| {
+            let goes_on = layer.iter().position(|r| r == rectangle);
+            match goes_on {
+                Some(at) => {
+                    layer.swap_remove(at);
+                }
+                None => out.push(rectangle.cells(map, *since, i)),
             }
-            next.clear();
-            for_each_run(column, zs.clone(), |low, high| {
-                let since = open.iter().find(|r| r.low == low && r.high == high).map_or(j, |r| r.since);
-                next.push(OpenRun { low, high, since });
-            });
-            for run in open.iter().filter(|r| !next.iter().any(|n| n.low == r.low && n.high == r.high)) {
-                out.push(run.cells(map, i, j));
-            }
-            std::mem::swap(&mut open, &mut next);
-        }
-        out.extend(open.iter().map(|run| run.cells(map, i, ys.end)));
+            goes_on.is_some()
+        });
+        before.extend(layer.drain(..).map(|rectangle| (rectangle, i)));
     }
+    out.extend(before.iter().map(|(rectangle, since)| rectangle.cells(map, *since, xs.end)));
 }
 
-/// Cells `low..high` along z, occupied since row `since`.
-struct OpenRun {
+/// Cells `y..y_end` by `low..high` of one layer along x.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Rectangle {
+    y: usize,
+    y_end: usize,
     low: usize,
     high: usize,
-    since: usize,
 }
 
-impl OpenRun {
-    fn cells(&self, map: &VoxelMap, i: usize, end: usize) -> Aabb {
-        Aabb { min: map.cube([i, self.since, self.low]).min, max: map.cube([i, end - 1, self.high - 1]).max }
+impl Rectangle {
+    fn cells(&self, map: &VoxelMap, x: usize, x_end: usize) -> Aabb {
+        Aabb { min: map.cube([x, self.y, self.low]).min, max: map.cube([x_end - 1, self.y_end - 1, self.high - 1]).max }
     }
+}
+
+/// The occupied rectangles of one layer: runs along z, equal ones joined along y. The vectors are scratch memory.
+fn rectangles(
+    map: &VoxelMap,
+    i: usize,
+    ys: std::ops::Range<usize>,
+    zs: std::ops::Range<usize>,
+    [open, next]: [&mut Vec<Rectangle>; 2],
+    out: &mut Vec<Rectangle>,
+) {
+    open.clear();
+    for j in ys {
+        let column = map.column(i, j);
+        if open.is_empty() && column.iter().all(|word| *word == 0) {
+            continue;
+        }
+        next.clear();
+        for_each_run(column, zs.clone(), |low, high| {
+            let since = open.iter().find(|r| r.low == low && r.high == high).map_or(j, |r| r.y);
+            next.push(Rectangle { y: since, y_end: j + 1, low, high });
+        });
+        out.extend(open.iter().filter(|r| !next.iter().any(|n| n.low == r.low && n.high == r.high)));
+        std::mem::swap(open, next);
+    }
+    out.extend(open.iter());
 }
 
 /// Runs of set bits within a range, ascending.

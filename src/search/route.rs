@@ -99,9 +99,10 @@ impl Route {
         (a[0] - b[0]).hypot(a[1] - b[1])
     }
 
-    /// All motions in order, cut into pieces.
+    /// All motions in order, cut into pieces. The first one stands still: postures may change before the base moves.
     pub fn pieces(&self, grain: Grain) -> Vec<BaseMotion> {
-        let mut out = Vec::new();
+        let start = Pose2::new(self.corners[0][0], self.corners[0][1], self.start_yaw);
+        let mut out = vec![BaseMotion { from: start, to: start }];
         let mut yaw = self.start_yaw;
         for (k, corner) in self.corners.iter().enumerate() {
             spin_pieces(Pose2::new(corner[0], corner[1], yaw), self.turns[k], grain, &mut out);

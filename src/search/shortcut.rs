@@ -44,7 +44,7 @@ impl<const W: usize> Shortcutter<'_, W> {
         let headings = headings_at_corners(&route);
         let mut checked = CheckedRoute { turns: Vec::new(), drives: Vec::new(), route };
         for (k, heading) in headings.iter().enumerate() {
-            let turn = self.turn(checked.route.corners[k], *heading, checked.route.turns[k])?;
+            let turn = self.turn(k, checked.route.corners[k], *heading, checked.route.turns[k])?;
             checked.turns.push(turn);
             if k + 1 < headings.len() {
                 let drive = self.drive(
@@ -59,8 +59,13 @@ impl<const W: usize> Shortcutter<'_, W> {
         (!forward[forward.len() - 1].and(self.goal_postures).is_empty()).then_some(checked)
     }
 
-    fn turn(&self, at: [f64; 2], yaw: f64, turn: f64) -> Option<Vec<Bits<W>>> {
+    /// Free postures of the pieces of a corner's turn; those of the first corner begin with standing still.
+    fn turn(&self, corner: usize, at: [f64; 2], yaw: f64, turn: f64) -> Option<Vec<Bits<W>>> {
         let mut pieces = Vec::new();
+        if corner == 0 {
+            let pose = Pose2::new(at[0], at[1], yaw);
+            pieces.push(BaseMotion { from: pose, to: pose });
+        }
         spin_pieces(Pose2::new(at[0], at[1], yaw), turn, self.grain, &mut pieces);
         self.masks_of(&pieces)
     }
@@ -160,9 +165,9 @@ impl<const W: usize> Shortcutter<'_, W> {
         if length + TURN_COST * (turn_a.abs() + turn_b.abs()) >= old - 1e-9 {
             return None;
         }
-        let first = self.turn(from, headings[a], turn_a)?;
+        let first = self.turn(a, from, headings[a], turn_a)?;
         let drive = self.drive(from, to, headings[a] + turn_a)?;
-        let second = self.turn(to, headings[a] + turn_a, turn_b)?;
+        let second = self.turn(b, to, headings[a] + turn_a, turn_b)?;
         let set = self.flow(self.flow(self.flow(forward[a], &first), &drive), &second);
         if set.and(backward[b]).is_empty() {
             return None;

@@ -32,6 +32,19 @@ fn every_kind_of_file_can_be_inspected() {
 }
 
 #[test]
+fn the_slab_of_a_map_is_two_numbers() {
+    let sandbox = Sandbox::new();
+    let run = sandbox.run(&["inspect", "--height", "0.1,0.2", "maps/first.csv"]).expect(0);
+    assert!(run.stdout.contains("obstacles z 0.100 to 0.200 m"), "{}", run.stdout);
+    sandbox.run(&["inspect", "--height", "-0.1,0.2", "maps/first.csv"]).expect(0);
+    for wrong in [["--height", "1"], ["--height", "1,0"], ["--height", "nan,1"], ["--height", "0,1,2"]] {
+        let run = sandbox.run(&["inspect", wrong[0], wrong[1], "maps/first.csv"]).expect(2);
+        assert!(run.stderr.contains("is no slab"), "{}", run.stderr);
+    }
+    sandbox.run(&["inspect", "--resolution", "nan", "maps/first.csv"]).expect(2);
+}
+
+#[test]
 fn what_is_no_such_file_is_said_to_be_none() {
     let sandbox = Sandbox::new();
     sandbox.write("odd.bin", [0u8, 159, 146, 150]);
