@@ -95,7 +95,8 @@ pub(super) struct CostToGo {
     core: Core,
 }
 
-const NEIGHBOURS: [(i32, i32, u32); 8] =
+/// Steps to the eight neighbours, with their length in tenths.
+pub(super) const NEIGHBOURS: [(i32, i32, u32); 8] =
     [(1, 0, 10), (0, 1, 10), (-1, 0, 10), (0, -1, 10), (1, 1, 14), (1, -1, 14), (-1, 1, 14), (-1, -1, 14)];
 
 /// Least clearance of the core, as interpolated at a lattice position, with which its centre may pass within 0.71 steps.

@@ -7,6 +7,7 @@
 mod astar;
 mod collide;
 mod drive;
+mod guide;
 mod heuristic;
 mod joints;
 mod lattice;
@@ -281,10 +282,10 @@ fn search_postures<const W: usize>(
         let shortcutter = Shortcutter { collider, start_postures, goal_postures, open_end, grain };
         let checked = shortcutter.shorten(shortcutter.check(route.clone())?);
         let pieces = checked.route.pieces(grain);
-        Some(with_joints(collider, robot, query, &checked, &pieces, [start_postures, goal_postures], expanded))
+        Ok(with_joints(collider, robot, query, &checked, &pieces, [start_postures, goal_postures], expanded))
     };
     if let Some(path) =
-        astar::straight_to_goal(query, options).find_map(|route| finish(&route, Grain::COARSE, &collider, 0))
+        astar::straight_to_goal(query, options).find_map(|route| finish(&route, Grain::COARSE, &collider, 0).ok())
     {
         return Ok(path);
     }
@@ -294,6 +295,16 @@ fn search_postures<const W: usize>(
     let goal = query.goal;
     let cost_to_go =
         heuristic::CostToGo::new(&lattice, (core, &core_clearances), map.resolution, clearance, goal, query.goal_yaw);
+    let slack = core.offset[0].hypot(core.offset[1]);
+    let mut guide = guide::Guide::new(&lattice, &core_clearances, clearance - slack);
+    for attempt in 0..guide::TRIES {
+        let Some(route) = guide.route(query, options, attempt) else { break };
+        let grain = if attempt == 0 { Grain::COARSE } else { Grain { drive: 0.1, turn: 0.15 } };
+        match finish(&route, grain, &collider, 0) {
+            Ok(path) => return Ok(path),
+            Err(place) => guide.avoid(place),
+        }
+    }
     let mut expanded_before = 0;
     for strict in [false, true] {
         let astar = astar::AStar {
@@ -319,13 +330,13 @@ fn search_postures<const W: usize>(
             }
         };
         expanded_before = expanded;
-        if let Some(path) = finish(&route, Grain::COARSE, &collider, expanded) {
+        if let Ok(path) = finish(&route, Grain::COARSE, &collider, expanded) {
             return Ok(path);
         }
         // At the lattice's own grain whatever the search got through passes, but for the tolerance of the checks.
         let lenient =
             Collider::<W>::new(robot, esdf, map, (clearance - CHECK_TOLERANCE).max(0.0), collider.grid.clone());
-        if let Some(path) = finish(&route, Grain::FINE, &lenient, expanded) {
+        if let Ok(path) = finish(&route, Grain::FINE, &lenient, expanded) {
             return Ok(path);
         }
     }

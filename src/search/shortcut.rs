@@ -39,24 +39,39 @@ impl<const W: usize> CheckedRoute<W> {
 }
 
 impl<const W: usize> Shortcutter<'_, W> {
-    /// Checks all pieces of a route. `None` where the postures do not get through.
-    pub fn check(&self, route: Route) -> Option<CheckedRoute<W>> {
+    /// Checks all pieces of a route.
+    ///
+    /// # Errors
+    /// About where it is blocked, or the postures do not get through.
+    pub fn check(&self, route: Route) -> Result<CheckedRoute<W>, [f64; 2]> {
         let headings = headings_at_corners(&route);
         let mut checked = CheckedRoute { turns: Vec::new(), drives: Vec::new(), route };
+        let mut set = self.start_postures;
         for (k, heading) in headings.iter().enumerate() {
-            let turn = self.turn(k, checked.route.corners[k], *heading, checked.route.turns[k])?;
-            checked.turns.push(turn);
-            if k + 1 < headings.len() {
-                let drive = self.drive(
-                    checked.route.corners[k],
-                    checked.route.corners[k + 1],
-                    heading + checked.route.turns[k],
-                )?;
-                checked.drives.push(drive);
+            let (at, turn) = (checked.route.corners[k], checked.route.turns[k]);
+            let turned = self.turn(k, at, *heading, turn).ok_or(at)?;
+            set = self.flow(set, &turned);
+            if set.is_empty() {
+                return Err(at);
             }
+            checked.turns.push(turned);
+            let Some(next) = checked.route.corners.get(k + 1).copied() else { continue };
+            let mut pieces = Vec::new();
+            let yaw = heading + turn;
+            drive_pieces(Pose2::new(at[0], at[1], yaw), Pose2::new(next[0], next[1], yaw), self.grain, &mut pieces);
+            let mut driven = Vec::with_capacity(pieces.len());
+            for piece in &pieces {
+                let mask = self.collider.free(piece);
+                set = self.collider.neighbours.flood(set, mask);
+                if set.is_empty() {
+                    return Err([0.5 * (piece.from.x + piece.to.x), 0.5 * (piece.from.y + piece.to.y)]);
+                }
+                driven.push(mask);
+            }
+            checked.drives.push(driven);
         }
-        let forward = self.reached(&checked);
-        (!forward[forward.len() - 1].and(self.goal_postures).is_empty()).then_some(checked)
+        let end = checked.route.corners[checked.route.corners.len() - 1];
+        if set.and(self.goal_postures).is_empty() { Err(end) } else { Ok(checked) }
     }
 
     /// Free postures of the pieces of a corner's turn; those of the first corner begin with standing still.

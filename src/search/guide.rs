@@ -1,0 +1,197 @@
+//! A first try before the search: a route through the middle of the free space, which often passes as it is.
+//!
+//! The lattice positions between start and goal are joined by the cheapest way in the plane, where being close to obstacles
+//! costs; its corners make a route, checked like any other. Where it is blocked the place is made expensive, and the next
+//! route tried. No route found this way proves nothing: then the search runs.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use super::heuristic::NEIGHBOURS;
+use super::lattice::Lattice;
+use super::route::Route;
+use super::{Query, SearchOptions};
+
+/// Routes that are tried.
+pub(super) const TRIES: usize = 6;
+/// Clearance of the base's core beyond which more is no better, m.
+const ROOM: f64 = 0.5;
+/// Corners are kept where the way bends by more than this, m: coarse on the first try, fine later.
+const BEND: [f64; 2] = [0.04, 0.02];
+/// What a place that blocked a route costs more, and how far about it (m).
+const BLOCKED: (u32, f64) = (6, 0.2);
+
+pub(super) struct Guide<'a> {
+    lattice: &'a Lattice,
+    /// Cost of a step to each position, in tenths of a straight step; 0: not passable.
+    costs: Vec<u32>,
+}
+
+impl<'a> Guide<'a> {
+    /// `clearances`: of the base's core at each position; where it is below `least` nothing passes.
+    pub fn new(lattice: &'a Lattice, clearances: &[f32], least: f64) -> Self {
+        let cost = |clearance: &f32| {
+            let room = f64::from(*clearance) - least;
+            if room < 0.0 {
+                return 0;
+            }
+            let tight = ((ROOM - room) / ROOM).max(0.0);
+            10 + (80.0 * tight * tight) as u32
+        };
+        Self { lattice, costs: clearances.iter().map(cost).collect() }
+    }
+
+    /// The route along the cheapest way. `None`: there is none in the plane.
+    pub fn route(&self, query: &Query, options: &SearchOptions, attempt: usize) -> Option<Route> {
+        if options.reverse && attempt > 2 {
+            return None; // backing up may be what it takes: leave that to the search
+        }
+        let way = self.way([query.start.x, query.start.y], [query.goal.x, query.goal.y])?;
+        let mut route = Route::new(query.start);
+        let goal = [query.goal.x, query.goal.y];
+        let mut kept = vec![[query.start.x, query.start.y]];
+        kept.extend(way);
+        kept.push(goal);
+        for point in corners(&kept, BEND[attempt.min(1)]) {
+            route.drive_to(point, false);
+        }
+        route.end_with(query.goal_yaw);
+        Some(route)
+    }
+
+    /// Makes the surroundings of a place expensive.
+    pub fn avoid(&mut self, place: [f64; 2]) {
+        let (factor, radius) = BLOCKED;
+        let at = self.lattice.coordinates(place[0], place[1]);
+        let reach = radius / self.lattice.step;
+        let range = |d: usize| (at[d] - reach).ceil() as i32..=(at[d] + reach).floor() as i32;
+        for i in range(0) {
+            for j in range(1) {
+                let near = (f64::from(i) - at[0]).hypot(f64::from(j) - at[1]) <= reach;
+                if near && self.lattice.contains(i, j) {
+                    let cost = &mut self.costs[self.lattice.index(i, j)];
+                    *cost = cost.saturating_mul(factor).min(100_000);
+                }
+            }
+        }
+    }
+
+    /// Positions of the cheapest way between the lattice positions nearest to two points.
+    fn way(&self, from: [f64; 2], to: [f64; 2]) -> Option<Vec<[f64; 2]>> {
+        let lattice = self.lattice;
+        let nearest = |p: [f64; 2]| {
+            let [i, j] = lattice.coordinates(p[0], p[1]).map(|v| v.round() as i32);
+            lattice.contains(i, j).then_some((i, j))
+        };
+        let (from, to) = (nearest(from)?, nearest(to)?);
+        let to_go = |(i, j): (i32, i32)| {
+            let (di, dj) = ((i - to.0).unsigned_abs(), (j - to.1).unsigned_abs());
+            10 * di.max(dj) + 4 * di.min(dj)
+        };
+        let mut best = vec![u32::MAX; self.costs.len()];
+        let mut came = vec![u8::MAX; self.costs.len()];
+        best[lattice.index(from.0, from.1)] = 0;
+        let mut open = BinaryHeap::from([Reverse((to_go(from), from))]);
+        while let Some(Reverse((estimate, at))) = open.pop() {
+            let own = best[lattice.index(at.0, at.1)];
+            if at == to {
+                break;
+            }
+            if estimate > own.saturating_add(to_go(at)) {
+                continue;
+            }
+            for (k, (di, dj, length)) in NEIGHBOURS.iter().enumerate() {
+                let next = (at.0 + di, at.1 + dj);
+                if !lattice.contains(next.0, next.1) {
+                    continue;
+                }
+                let index = lattice.index(next.0, next.1);
+                if self.costs[index] == 0 {
+                    continue;
+                }
+                let cost = own.saturating_add(self.costs[index] * length / 10);
+                if cost < best[index] {
+                    best[index] = cost;
+                    came[index] = k as u8;
+                    open.push(Reverse((cost.saturating_add(to_go(next)), next)));
+                }
+            }
+        }
+        let mut at = to;
+        let mut way = Vec::new();
+        while at != from {
+            way.push(lattice.position(at.0, at.1));
+            let (di, dj, _) = *NEIGHBOURS.get(usize::from(came[lattice.index(at.0, at.1)]))?;
+            at = (at.0 - di, at.1 - dj);
+        }
+        // The ends are not the exact start and goal: the first and last steps would only wiggle.
+        way.reverse();
+        way.pop();
+        Some(way.into_iter().skip(1).collect())
+    }
+}
+
+/// The points but the first that are needed to stay within `bend` of all of them (Ramer 1972; Douglas & Peucker 1973).
+fn corners(points: &[[f64; 2]], bend: f64) -> Vec<[f64; 2]> {
+    let mut keep = vec![false; points.len()];
+    let mut open = vec![(0, points.len() - 1)];
+    while let Some((a, b)) = open.pop() {
+        keep[b] = true;
+        let (p, q) = (points[a], points[b]);
+        let (dx, dy) = (q[0] - p[0], q[1] - p[1]);
+        let length = dx.hypot(dy);
+        let off = |r: [f64; 2]| {
+            let (ex, ey) = (r[0] - p[0], r[1] - p[1]);
+            if length > 0.0 { (dx * ey - dy * ex).abs() / length } else { ex.hypot(ey) }
+        };
+        let farthest = (a + 1..b).map(|k| (off(points[k]), k)).max_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((_, k)) = farthest.filter(|(distance, _)| *distance > bend) {
+            open.push((a, k));
+            open.push((k, b));
+        }
+    }
+    points.iter().zip(keep).filter(|(_, keep)| *keep).map(|(p, _)| *p).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::VoxelMap;
+    use crate::mission::Unknown;
+
+    #[test]
+    fn the_way_keeps_to_the_middle_of_a_corridor_and_goes_round_what_is_avoided() {
+        let lattice = Lattice::new(&VoxelMap::new(0.05, [0.0; 3], [60, 40, 1], Unknown::Occupied));
+        let edge = |v: f64, length: f64| v.min(length - v);
+        let clearances: Vec<f32> = (0..lattice.size[0])
+            .flat_map(|i| (0..lattice.size[1]).map(move |j| (i, j)))
+            .map(|(i, j)| {
+                let [x, y] = lattice.position(i, j);
+                edge(x, 3.0).min(edge(y, 2.0)) as f32
+            })
+            .collect();
+        let mut guide = Guide::new(&lattice, &clearances, 0.02);
+        let middle = guide.way([0.3, 1.0], [2.7, 1.0]).expect("free");
+        assert!(middle.iter().all(|p| (p[1] - 1.0).abs() < 0.06), "{middle:?}");
+        guide.avoid([1.5, 1.0]);
+        let around = guide.way([0.3, 1.0], [2.7, 1.0]).expect("free");
+        assert!(around.iter().all(|p| (p[0] - 1.5).hypot(p[1] - 1.0) > 0.19), "{around:?}");
+    }
+
+    #[test]
+    fn corners_stay_within_the_bend() {
+        let points: Vec<[f64; 2]> = (0..100).map(|k| [0.05 * f64::from(k), (0.05 * f64::from(k)).sin()]).collect();
+        let kept = corners(&points, 0.03);
+        assert!(kept.len() < 20 && kept.last() == points.last());
+        let mut all = vec![points[0]];
+        all.extend(&kept);
+        for p in &points {
+            let off = all.windows(2).map(|w| {
+                let (dx, dy) = (w[1][0] - w[0][0], w[1][1] - w[0][1]);
+                let share = (((p[0] - w[0][0]) * dx + (p[1] - w[0][1]) * dy) / (dx * dx + dy * dy)).clamp(0.0, 1.0);
+                (p[0] - w[0][0] - share * dx).hypot(p[1] - w[0][1] - share * dy)
+            });
+            assert!(off.fold(f64::INFINITY, f64::min) <= 0.03 + 1e-9);
+        }
+    }
+}
