@@ -185,7 +185,20 @@ impl PathReference {
     /// Distance from a point to the path, m.
     pub fn distance(&self, point: [f64; 2]) -> f64 {
         let nearest = self.nearest_vertex(point);
-        // The foot lies beside the nearest vertex: on its curve, not on the chord.
+        let place = self.vertices[nearest].point;
+        // Where legs join, several vertices share a place, and the foot lies on the leg of any of them.
+        let shared = |k: &usize| square(self.vertices[*k].point, place) < 1e-18;
+        let before = (0..nearest).rev().take_while(shared);
+        let after = (nearest + 1..self.vertices.len()).take_while(shared);
+        std::iter::once(nearest)
+            .chain(before)
+            .chain(after)
+            .map(|k| self.distance_near(k, point))
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Distance to the path about one vertex: to its curve, not to the chord.
+    fn distance_near(&self, nearest: usize, point: [f64; 2]) -> f64 {
         let vertex = self.vertices[nearest];
         let near = square(vertex.point, point).sqrt();
         match &self.courses[vertex.course as usize] {

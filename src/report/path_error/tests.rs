@@ -69,3 +69,14 @@ fn rows_come_in_order_and_carry_the_clearance_of_their_table() {
     assert!(rows.iter().all(|row| row.end_point <= 0.5e-3), "{rows:?}");
     assert!(rows[0].lateral_max < rows[2].lateral_max);
 }
+
+#[test]
+fn a_corner_between_straight_legs_is_no_error() {
+    // Straight drives and a spin are replayed exactly, so what is left is rounding, also in the first millimetre behind the corner.
+    let straight = |a: [f64; 2], b: [f64; 2]| {
+        let at = |share: f64| [a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])];
+        [a, at(1.0 / 3.0), at(2.0 / 3.0), b]
+    };
+    let row = plain(&[straight([0.0, 0.0], [1.0, 0.0]), straight([1.0, 0.0], [1.3, 0.9])], Sampling::Mean, 0.01);
+    assert!(row.lateral_max < 1e-8, "{row:?}");
+}
