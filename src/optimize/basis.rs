@@ -9,6 +9,8 @@ pub struct Basis {
     pub at: f64,
     /// Orders 0 to 3.
     pub rows: [[f64; TERMS]; 4],
+    /// The same by power: `columns[power][order]`.
+    pub columns: [[f64; 4]; TERMS],
 }
 
 impl Basis {
@@ -21,7 +23,8 @@ impl Basis {
                 *value = factor * u.powi((power - order) as i32);
             }
         }
-        Self { at: u, rows }
+        let columns = std::array::from_fn(|power| std::array::from_fn(|order| rows[order][power]));
+        Self { at: u, rows, columns }
     }
 
     /// Derivative of one order and dimension in real time; `c` is the piece's `[power * m + dimension]`, `scale` is
@@ -35,11 +38,24 @@ impl Basis {
         sum * scale
     }
 
-    /// Chain rule: adds `by * d(derivative)/dc` to `gradient` (same layout as `c`).
-    pub fn add_gradient(&self, gradient: &mut [f64], m: usize, d: usize, order: usize, by: f64) {
-        let row = &self.rows[order];
-        for power in order..TERMS {
-            gradient[power * m + d] += row[power] * by;
+    /// Orders 0 to 3 of one dimension in one go; `rate` is `1 / T`.
+    #[inline]
+    pub fn orders(&self, c: &[f64], m: usize, d: usize, rate: f64) -> [f64; 4] {
+        let mut sums = [0.0; 4];
+        for (value, factors) in c[d..].iter().step_by(m).zip(&self.columns) {
+            for (sum, factor) in sums.iter_mut().zip(factors) {
+                *sum += factor * value;
+            }
+        }
+        let rate2 = rate * rate;
+        [sums[0], sums[1] * rate, sums[2] * rate2, sums[3] * rate2 * rate]
+    }
+
+    /// Chain rule of [`Self::orders`], all orders in one go: `by` is already scaled by `rate^order`.
+    #[inline]
+    pub fn add_gradients(&self, gradient: &mut [f64], m: usize, d: usize, by: [f64; 4]) {
+        for (value, f) in gradient[d..].iter_mut().step_by(m).zip(&self.columns) {
+            *value += (f[0] * by[0] + f[1] * by[1]) + (f[2] * by[2] + f[3] * by[3]);
         }
     }
 }
@@ -55,6 +71,8 @@ mod tests {
             let at = |u: &[f64]| Basis::new(u[0]).derivative(&c, 1, 0, order - 1, 1.0);
             let numeric = crate::math::fd::numeric_gradient(at, &[0.37], 1e-3)[0];
             assert!((Basis::new(0.37).derivative(&c, 1, 0, order, 1.0) - numeric).abs() < 1e-9);
+            let scaled = Basis::new(0.37).derivative(&c, 1, 0, order, 0.7f64.powi(order as i32));
+            assert!((Basis::new(0.37).orders(&c, 1, 0, 0.7)[order] - scaled).abs() < 1e-12);
         }
     }
 }

@@ -45,6 +45,40 @@ pub struct ShapeContour {
     pub patches: Vec<Patch>,
 }
 
+/// How far a shape's points move at most, whatever the posture, for every radian that the base or a joint turns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reach {
+    /// m per radian of heading.
+    pub radius: f64,
+    /// Per joint, m per radian or metre.
+    pub joints: Vec<f64>,
+}
+
+impl Reach {
+    /// From the chain of bodies: no point is further from a joint than all links between them laid end to end.
+    pub fn of(robot: &RobotModel, shape: &ShapeContour) -> Self {
+        let mut radius = shape.patches.first().map_or(0.0, |p| p.centre.coords.norm() + p.radius);
+        let mut joints = vec![0.0; robot.joints.len()];
+        let mut at = shape.body;
+        while at != 0 {
+            let body = &robot.bodies[at];
+            if let Some(motion) = &body.motion {
+                let joint = &robot.joints[motion.joint];
+                joints[motion.joint] += motion.multiplier.abs() * if motion.prismatic { 1.0 } else { radius };
+                if motion.prismatic {
+                    let slide = |q: f64| (motion.multiplier * q + motion.offset).abs();
+                    // A joint may overstep its limits a little on the way.
+                    radius += 1.1 * slide(joint.lower).max(slide(joint.upper)) + 0.1;
+                }
+            }
+            radius += body.origin.translation.vector.norm();
+            at = body.parent;
+        }
+        radius += robot.bodies[0].origin.translation.vector.norm();
+        Self { radius, joints }
+    }
+}
+
 /// Contour points of the robot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contour {

@@ -2,7 +2,7 @@
 
 use super::options::OptimizeOptions;
 use super::penalty::Limits;
-use super::sections::DriveSection;
+use super::sections::{CORNER_SHARE, DriveSection};
 use super::{minco::ORDERS, time_map};
 use crate::search::SearchPath;
 
@@ -30,6 +30,8 @@ pub(crate) struct Guess {
     pub pieces: usize,
     /// Waypoints, then virtual times.
     pub variables: Vec<f64>,
+    /// Arc length on the section's polyline where each piece begins, and the end's, m.
+    pub breaks: Vec<f64>,
 }
 
 /// The polyline of a section, by arc length.
@@ -134,7 +136,13 @@ pub(crate) fn guess(path: &SearchPath, section: &DriveSection, limits: &Limits, 
         z[m + 1] = side * limits.min_speed * sin;
         z
     };
-    Guess { start: state(section.first), end: state(section.last), pieces, variables }
+    Guess {
+        start: state(section.first),
+        end: state(section.last),
+        pieces,
+        variables,
+        breaks: breaks.iter().map(|b| b.at).collect(),
+    }
 }
 
 fn bends(line: &Line<'_>, options: &OptimizeOptions) -> Vec<Bend> {
@@ -161,7 +169,7 @@ fn bends(line: &Line<'_>, options: &OptimizeOptions) -> Vec<Bend> {
         }
         let before = if i > 0 { bends[i].at - bends[i - 1].at } else { f64::INFINITY };
         let after = if i + 1 < bends.len() { bends[i + 1].at - bends[i].at } else { f64::INFINITY };
-        bends[i].reach = options.corner_distance.min(0.4 * before.min(after));
+        bends[i].reach = options.corner_distance.min(CORNER_SHARE * before.min(after));
     }
     bends
 }
@@ -184,9 +192,16 @@ fn breaks(line: &Line<'_>, limits: &Limits, options: &OptimizeOptions) -> Vec<Br
         // The straight up to this bend's rounding.
         let from = breaks[breaks.len() - 1].at;
         let to = (bend.at - bend.reach).max(from);
-        let n = straight_pieces(line, from, to, limits, options);
+        let (head, tail) = ramps(from, to, length, limits, options);
+        if head > from {
+            breaks.push(on_line(head, 0.0));
+        }
+        let n = straight_pieces(line, head, tail, limits, options);
         for k in 1..n {
-            breaks.push(on_line(from + (to - from) * k as f64 / n as f64, 0.0));
+            breaks.push(on_line(head + (tail - head) * k as f64 / n as f64, 0.0));
+        }
+        if tail < to {
+            breaks.push(on_line(tail, 0.0));
         }
         let angle = bend.angle.abs();
         if bend.reach > 0.0 && i == 0 {
@@ -229,6 +244,15 @@ fn breaks(line: &Line<'_>, limits: &Limits, options: &OptimizeOptions) -> Vec<Br
         kept.push(on_line(length, 0.0));
     }
     kept
+}
+
+/// Where the straight from `from` to `to` has left its ramp from rest, and where it comes to the ramp to rest: a piece of its
+/// own each, where there is room, so that what speeds up is not the same polynomial as what cruises.
+fn ramps(from: f64, to: f64, length: f64, limits: &Limits, options: &OptimizeOptions) -> (f64, f64) {
+    let ramp = limits.speed * limits.speed / limits.acceleration;
+    let head = if from <= 0.0 { ramp } else { 0.0 };
+    let tail = if to >= length { ramp } else { 0.0 };
+    if to - from > head + tail + 0.5 * options.piece_length { (from + head, to - tail) } else { (from, to) }
 }
 
 /// Number of pieces on a straight: by length, and more where joints move.

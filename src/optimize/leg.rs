@@ -7,19 +7,21 @@ use super::objective::{Objective, Violation};
 use super::options::OptimizeOptions;
 use super::penalty::Limits;
 use super::penalty::clearance::{ClearancePenalty, DistanceField};
-use super::sections::DriveSection;
+use super::sections::{DriveSection, Thresholds};
 use super::time_map;
 use crate::geom::unwrap_near;
 use crate::math::lbfgs::{Lbfgs, Stop};
 use crate::math::poly::{Piece, PiecewisePoly};
 use crate::robot::RobotModel;
-use crate::search::SearchPath;
+use crate::search::{SearchMove, SearchPath};
 use crate::trajectory::{DriveLeg, Ending};
 
 /// Samples a piece by which a finished curve is judged, per sparse sample.
 const JUDGE_DENSITY: usize = 4;
 /// A limit overstepped by this share makes the whole motion crawl once it is slowed down to keep it.
 const HOPELESS: f64 = 0.5;
+/// A limit overstepped by this share after a pass is a corner that no curve gets round; cut at once.
+const LOST: f64 = 0.6;
 /// A curve that takes this many times the first guess's time (and 2 s for its ramps) is caught in a loop.
 const DETOUR: f64 = 1.4;
 /// The heading at a leg's end is fixed by its end state; a difference is whole turns.
@@ -31,6 +33,8 @@ pub(crate) struct Context<'a, F> {
     pub field: &'a F,
     pub limits: Limits,
     pub clearance: ClearancePenalty,
+    /// Which spins curves take in.
+    pub thresholds: Thresholds,
     /// The options, and those of a second attempt: stiffer against what lets a curve slip into a loop.
     pub attempts: [OptimizeOptions; 2],
 }
@@ -45,7 +49,8 @@ impl<'a, F: DistanceField> Context<'a, F> {
             robot,
             field,
             limits: Limits::new(robot, options.penalty_width),
-            clearance: ClearancePenalty::new(contour, robot.bodies.len(), options.clearance, scale, field.cell()),
+            clearance: ClearancePenalty::new(contour, robot, options.clearance, scale, field.cell()),
+            thresholds: Thresholds::of(options),
             attempts: [options.clone(), stiffer(options)],
         }
     }
@@ -70,9 +75,11 @@ pub(crate) struct SolvedLeg {
     /// Keeps its heading's branch, its clearance within the tolerance, and roughly its limits.
     pub sound: bool,
     pub violation: Violation,
+    /// State of the path where the worst piece might be taken apart: a spin inside the section.
+    pub cut: Option<usize>,
 }
 
-/// Optimises one section; where the first attempt is not sound, a second one may be.
+/// Optimises one section; where the first attempt is not sound and there is nothing to cut, a second one may be.
 pub(crate) fn solve<F: DistanceField>(
     path: &SearchPath,
     section: &DriveSection,
@@ -80,13 +87,33 @@ pub(crate) fn solve<F: DistanceField>(
 ) -> SolvedLeg {
     let [first, second] = &context.attempts;
     let solved = attempt(path, section, context, first);
-    if solved.sound {
+    if solved.sound || solved.cut.is_some() {
         return solved;
     }
     let again = attempt(path, section, context, second);
     let iterations = solved.iterations + again.iterations;
     let better = if again.sound || again.violation.clearance < solved.violation.clearance { again } else { solved };
     SolvedLeg { iterations, ..better }
+}
+
+/// The spin nearest to the middle of a piece, by arc length.
+fn spin_near(path: &SearchPath, section: &DriveSection, breaks: &[f64], piece: usize) -> Option<usize> {
+    let middle = 0.5 * (breaks[piece] + breaks[piece + 1]);
+    let mut arc = 0.0;
+    let mut best: Option<(f64, usize)> = None;
+    for i in section.first..section.last {
+        let (from, to) = (path.states[i].pose, path.states[i + 1].pose);
+        arc += from.distance(to);
+        // Spins at the ends are no place to cut: nothing would be left on one side.
+        let inside = arc > 1e-9 && arc < breaks[breaks.len() - 1] - 1e-9;
+        if inside && path.moves[i] == SearchMove::Still && from.yaw != to.yaw {
+            let off = (arc - middle).abs();
+            if best.is_none_or(|(least, _)| off < least) {
+                best = Some((off, i));
+            }
+        }
+    }
+    best.map(|(_, state)| state)
 }
 
 fn attempt<F: DistanceField>(
@@ -104,7 +131,7 @@ fn attempt<F: DistanceField>(
     let guessed: f64 = x[x.len() - first.pieces..].iter().map(|tau| time_map::duration(*tau).0).sum();
     let judged_at = options.samples_per_piece.max(1) * JUDGE_DENSITY;
     let (mut iterations, mut cost, mut ending) = (0, f64::NAN, Ending::Converged);
-    let mut violation = Violation { motion: f64::INFINITY, clearance: f64::INFINITY };
+    let mut violation = Violation { motion: f64::INFINITY, clearance: f64::INFINITY, worst_piece: 0 };
     for _ in 0..options.passes.max(1) {
         let end = iteration.minimise(&mut x, |x, g| objective.evaluate(x, g));
         iterations += end.iterations;
@@ -122,7 +149,8 @@ fn attempt<F: DistanceField>(
         violation = objective.violation(&x, judged_at);
         let (fast, near) =
             (violation.motion > options.motion_tolerance, violation.clearance > options.pass_clearance_tolerance);
-        if !fast && !near {
+        let lost = violation.motion > LOST && spin_near(path, section, &first.breaks, violation.worst_piece).is_some();
+        if (!fast && !near) || lost {
             break;
         }
         if fast {
@@ -155,7 +183,8 @@ fn attempt<F: DistanceField>(
         objective.violation(&first.variables, 1);
         leg = leg_of(objective.curve());
     }
-    SolvedLeg { pieces: leg.curve.pieces.len(), leg, iterations, cost, ending, sound, violation }
+    let cut = spin_near(path, section, &first.breaks, violation.worst_piece);
+    SolvedLeg { pieces: leg.curve.pieces.len(), leg, iterations, cost, ending, sound, violation, cut }
 }
 
 /// Heading at the end of a leg, followed along the curve; `None` where it jumps (the curve stops and turns back).

@@ -2,7 +2,7 @@
 //!
 //! `sections` cuts the path at cusps and large spins; each driven section becomes one curve (`leg`): first guess (`initial`),
 //! cost and gradient ([`objective`] over [`minco`], [`flatness`], [`penalty`], [`contour`]), L-BFGS. A section whose curve is
-//! not sound is cut at all its spins and driven stop, spin, go.
+//! not sound is cut at the spin nearest to its worst piece, where the robot then stops, and both parts are tried again.
 
 mod basis;
 pub mod contour;
@@ -44,7 +44,7 @@ pub fn optimize_in<F: DistanceField>(
     let context = Context::new(robot, field, options);
     let mut legs = Vec::new();
     let mut outcome = OptimiserOutcome { pieces: 0, iterations: 0, ending: Ending::Converged, cost: 0.0 };
-    for section in sections(path, 0, path.moves.len(), &context.limits, Thresholds::of(options)) {
+    for section in sections(path, 0, path.moves.len(), &context.limits, context.thresholds) {
         match section {
             Section::Still(leg) => legs.push(Leg::Still(leg)),
             Section::Drive(drive) => solve_or_split(path, drive, &context, &mut legs, &mut outcome),
@@ -56,6 +56,7 @@ pub fn optimize_in<F: DistanceField>(
     Trajectory { legs, source: TrajectorySource::Optimised, optimiser: Some(outcome) }
 }
 
+/// Solves a section; one that no sound curve follows is cut where it is worst, and both parts are tried again.
 fn solve_or_split<F: DistanceField>(
     path: &SearchPath,
     drive: DriveSection,
@@ -65,22 +66,19 @@ fn solve_or_split<F: DistanceField>(
 ) {
     let solved = solve(path, &drive, context);
     outcome.iterations += solved.iterations;
-    if solved.sound {
+    let Some(cut) = solved.cut.filter(|_| !solved.sound) else {
+        // Where there is nothing to cut, this is as good as it gets. The certificate judges.
         return keep(solved, legs, outcome);
-    }
-    let parts = sections(path, drive.first, drive.last, &context.limits, Thresholds::NONE);
+    };
+    let thresholds = Thresholds { cut: Some(cut), ..context.thresholds };
+    let parts = sections(path, drive.first, drive.last, &context.limits, thresholds);
     if parts.len() < 2 {
-        // Straight already: nothing to cut, so this is as good as it gets. The certificate judges.
         return keep(solved, legs, outcome);
     }
     for part in parts {
         match part {
             Section::Still(leg) => legs.push(Leg::Still(leg)),
-            Section::Drive(drive) => {
-                let solved = solve(path, &drive, context);
-                outcome.iterations += solved.iterations;
-                keep(solved, legs, outcome);
-            }
+            Section::Drive(drive) => solve_or_split(path, drive, context, legs, outcome),
         }
     }
 }

@@ -8,7 +8,7 @@ use super::basis::Basis;
 use super::flatness::{BaseMotion, base_motion, pull_back};
 use super::minco::{Minco, TERMS};
 use super::options::OptimizeOptions;
-use super::penalty::clearance::{ByPose, ClearancePenalty, DistanceField};
+use super::penalty::clearance::{ByPose, ClearancePenalty, DistanceField, Placement};
 use super::penalty::{Judge, Limits, Penalise, Worst, joint, speed, turn};
 use super::time_map;
 use crate::math::smooth::smooth_switch;
@@ -32,6 +32,8 @@ pub struct Violation {
     pub motion: f64,
     /// By how much the worst contour point misses the wanted clearance, m; negative: nothing misses it.
     pub clearance: f64,
+    /// The piece with the worst of both, each against its tolerance.
+    pub worst_piece: usize,
 }
 
 /// Cost of one leg; owns all scratch memory.
@@ -58,6 +60,8 @@ pub struct Objective<'a, F> {
     by_waypoints: Vec<f64>,
     joints: Vec<f64>,
     by_joints: Vec<f64>,
+    /// So much clearance missed is as bad as a limit overstepped by 100 %, m.
+    clearance_unit: f64,
 }
 
 /// The switch of \[SCR\] Eq. 10.
@@ -76,7 +80,7 @@ impl<'a, F: DistanceField> Objective<'a, F> {
         field: &'a F,
         minco: Minco,
         reverse: bool,
-        clearance: ClearancePenalty,
+        mut clearance: ClearancePenalty,
         options: &OptimizeOptions,
     ) -> Self {
         let limits = Limits::new(robot, options.penalty_width);
@@ -84,6 +88,7 @@ impl<'a, F: DistanceField> Objective<'a, F> {
         let sparse = options.samples_per_piece.max(1);
         let dense_step = if options.dense { options.dense_samples.max(1).next_multiple_of(2) } else { 1 };
         let total = sparse * dense_step;
+        clearance.remember(pieces * (sparse + 1) + 1);
         let slow = options.dense_below * limits.speed;
         Self {
             robot,
@@ -102,6 +107,7 @@ impl<'a, F: DistanceField> Objective<'a, F> {
             by_waypoints: vec![0.0; (pieces - 1) * m],
             joints: vec![0.0; m - 2],
             by_joints: vec![0.0; m - 2],
+            clearance_unit: options.clearance_scale,
             limits,
             minco,
             clearance,
@@ -140,9 +146,10 @@ impl<'a, F: DistanceField> Objective<'a, F> {
         let mut cost = self.time_weight * self.durations.iter().sum::<f64>();
         for piece in 0..self.minco.pieces() {
             for sample in 0..=self.sparse {
-                cost += self.sparse_sample(piece, sample);
-                if self.dense.is_some() {
-                    cost += self.dense_cell(piece, sample);
+                let z = self.base_at(piece, sample * self.dense_step);
+                cost += self.sparse_sample(piece, sample, &z);
+                if let Some(dense) = self.dense {
+                    cost += self.dense_cell(piece, sample, &z, dense);
                 }
             }
         }
@@ -161,36 +168,27 @@ impl<'a, F: DistanceField> Objective<'a, F> {
     fn base_at(&self, piece: usize, entry: usize) -> [[f64; 2]; 4] {
         let m = self.minco.dimensions();
         let c = &self.minco.coefficients()[piece * TERMS * m..(piece + 1) * TERMS * m];
-        let basis = &self.table[entry];
         let rate = 1.0 / self.durations[piece];
-        let scales = [1.0, rate, rate * rate, rate * rate * rate];
-        std::array::from_fn(|order| std::array::from_fn(|d| basis.derivative(c, m, d, order, scales[order])))
+        let (x, y) = (self.table[entry].orders(c, m, 0, rate), self.table[entry].orders(c, m, 1, rate));
+        std::array::from_fn(|order| [x[order], y[order]])
     }
 
     /// Adds `factor * by` (derivatives by the orders 0 to 3 of dimension `d`, whose values are `z`) to the gradients.
     fn push(&mut self, piece: usize, entry: usize, d: usize, z: [f64; 4], by: [f64; 4], factor: f64) {
         let m = self.minco.dimensions();
         let rate = 1.0 / self.durations[piece];
-        let mut scale = factor;
-        let mut stretch = 0.0;
         let gradient = &mut self.by_coefficients[piece * TERMS * m..(piece + 1) * TERMS * m];
-        for order in 0..4 {
-            if by[order] != 0.0 {
-                self.table[entry].add_gradient(gradient, m, d, order, by[order] * scale);
-                stretch += order as f64 * by[order] * z[order];
-            }
-            scale *= rate;
-        }
-        self.by_durations[piece] -= factor * rate * stretch;
+        let scales = [factor, factor * rate, factor * rate * rate, factor * rate * rate * rate];
+        self.table[entry].add_gradients(gradient, m, d, std::array::from_fn(|order| by[order] * scales[order]));
+        self.by_durations[piece] -= factor * rate * (by[1] * z[1] + 2.0 * by[2] * z[2] + 3.0 * by[3] * z[3]);
     }
 
     /// All sparse penalties at sample `j` of a piece, \[SCR\] Eq. 9.
-    fn sparse_sample(&mut self, piece: usize, j: usize) -> f64 {
+    fn sparse_sample(&mut self, piece: usize, j: usize, z: &[[f64; 2]; 4]) -> f64 {
         let entry = j * self.dense_step;
         let half = if j == 0 || j == self.sparse { 0.5 } else { 1.0 };
         let share = half / self.sparse as f64;
         let weight = share * self.durations[piece];
-        let z = self.base_at(piece, entry);
         let motion = base_motion(z[1], z[2], z[3]);
         let mut by = BaseMotion::default();
         let mut judge = Penalise(self.limits.width);
@@ -199,11 +197,11 @@ impl<'a, F: DistanceField> Objective<'a, F> {
             + turn::turning(&motion, &self.limits, &mut judge, &mut by);
         let joint_cost = self.sample_joints(piece, entry, weight);
         let mut by_pose = ByPose::default();
-        let near = self.sample_clearance(&z, &motion, &mut judge, &mut by_pose);
+        let near = self.sample_clearance(z, &motion, &mut judge, &mut by_pose, piece * (self.sparse + 1) + j);
         let mut cost = self.weights.motion * (motion_cost + joint_cost);
         if motion_cost != 0.0 {
             let g = pull_back(&motion, &by, z[1], z[2], z[3]);
-            self.push_base(piece, entry, &z, [[0.0; 2], g.0, g.1, g.2], weight * self.weights.motion);
+            self.push_base(piece, entry, z, [[0.0; 2], g.0, g.1, g.2], weight * self.weights.motion);
         }
         if near != 0.0 {
             cost += self.weights.clearance * near;
@@ -211,7 +209,7 @@ impl<'a, F: DistanceField> Objective<'a, F> {
             // d(heading)/d(d1) = B d1 / v^2: the same forwards and backwards.
             let turn = by_pose.heading / (motion.v * motion.v);
             let by_d1 = [-turn * z[1][1], turn * z[1][0]];
-            self.push_base(piece, entry, &z, [by_pose.position, by_d1, [0.0; 2], [0.0; 2]], factor);
+            self.push_base(piece, entry, z, [by_pose.position, by_d1, [0.0; 2], [0.0; 2]], factor);
             for joint in 0..self.joints.len() {
                 self.push(piece, entry, joint + 2, [0.0; 4], [self.by_joints[joint], 0.0, 0.0, 0.0], factor);
             }
@@ -235,9 +233,7 @@ impl<'a, F: DistanceField> Objective<'a, F> {
             let c = &self.minco.coefficients()[piece * TERMS * m..(piece + 1) * TERMS * m];
             let basis = &self.table[entry];
             let d = index + 2;
-            let q = basis.derivative(c, m, d, 0, 1.0);
-            let d1 = basis.derivative(c, m, d, 1, rate);
-            let d2 = basis.derivative(c, m, d, 2, rate * rate);
+            let [q, d1, d2, _] = basis.orders(c, m, d, rate);
             self.joints[index] = q;
             let (cost, by) = joint::joint(q, d1, d2, &self.limits.joints[index], &mut Penalise(self.limits.width));
             if cost != 0.0 {
@@ -256,18 +252,18 @@ impl<'a, F: DistanceField> Objective<'a, F> {
         motion: &BaseMotion,
         judge: &mut impl Judge,
         by_pose: &mut ByPose,
+        sample: usize,
     ) -> f64 {
         self.by_joints.fill(0.0);
         let scale = self.direction / motion.v;
         let heading = [z[1][0] * scale, z[1][1] * scale];
-        self.clearance.add(self.robot, self.field, z[0], heading, &self.joints, judge, by_pose, &mut self.by_joints)
+        let at = Placement { position: z[0], heading, joints: &self.joints };
+        self.clearance.add(self.robot, self.field, at, sample, judge, by_pose, &mut self.by_joints)
     }
 
     /// The dense sum around sample `j`, \[SCR\] Eq. 11: least speed, turn rate, angular acceleration; and the rims.
-    fn dense_cell(&mut self, piece: usize, j: usize) -> f64 {
-        let Some(dense) = self.dense else { return 0.0 };
+    fn dense_cell(&mut self, piece: usize, j: usize, z: &[[f64; 2]; 4], dense: Dense) -> f64 {
         let centre = j * self.dense_step;
-        let z = self.base_at(piece, centre);
         let speed_square = z[1][0] * z[1][0] + z[1][1] * z[1][1];
         let (switch, slope) = smooth_switch(dense.below - speed_square, dense.blend);
         if switch == 0.0 {
@@ -284,7 +280,7 @@ impl<'a, F: DistanceField> Objective<'a, F> {
         self.by_durations[piece] += switch * share * sum;
         if slope != 0.0 && sum != 0.0 {
             let factor = -2.0 * slope * sum * share * self.durations[piece];
-            self.push_base(piece, centre, &z, [[0.0; 2], z[1], [0.0; 2], [0.0; 2]], factor);
+            self.push_base(piece, centre, z, [[0.0; 2], z[1], [0.0; 2], [0.0; 2]], factor);
         }
         switch * share * sum * self.durations[piece]
     }
@@ -310,8 +306,13 @@ impl<'a, F: DistanceField> Objective<'a, F> {
         self.shape(x);
         let m = self.minco.dimensions();
         let (mut motion, mut near) = (Worst(0.0), Worst(f64::NEG_INFINITY));
+        // One more than the samples of the cost: a place in memory for what is looked at once.
+        let scratch = self.minco.pieces() * (self.sparse + 1);
         let mut ignored = BaseMotion::default();
+        let (mut worst_piece, mut worst) = (0, 0.0);
         for piece in 0..self.minco.pieces() {
+            let before =
+                (std::mem::replace(&mut motion, Worst(0.0)), std::mem::replace(&mut near, Worst(f64::NEG_INFINITY)));
             for k in 0..=per_piece {
                 let basis = Basis::new(k as f64 / per_piece as f64);
                 let rate = 1.0 / self.durations[piece];
@@ -328,10 +329,16 @@ impl<'a, F: DistanceField> Objective<'a, F> {
                 speed::speed_and_acceleration(&base, &self.limits, &mut motion, &mut ignored);
                 speed::rims(&base, &self.limits, &mut motion, &mut ignored);
                 turn::turning(&base, &self.limits, &mut motion, &mut ignored);
-                self.sample_clearance(&z, &base, &mut near, &mut ByPose::default());
+                self.clearance.forget(scratch);
+                self.sample_clearance(&z, &base, &mut near, &mut ByPose::default(), scratch);
             }
+            let own = motion.0.max(self.clearance.missed(near.0) / self.clearance_unit);
+            if own > worst {
+                (worst_piece, worst) = (piece, own);
+            }
+            (motion, near) = (Worst(motion.0.max(before.0.0)), Worst(near.0.max(before.1.0)));
         }
-        Violation { motion: motion.0, clearance: self.clearance.missed(near.0) }
+        Violation { motion: motion.0, clearance: self.clearance.missed(near.0), worst_piece }
     }
 }
 

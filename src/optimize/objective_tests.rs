@@ -32,7 +32,7 @@ fn check(joints: usize, reverse: bool, seed: u64) {
     ends[0][m] = 0.25;
     ends[1][m] = 0.25;
     let contour = Contour::new(&robot, 0.1);
-    let scratch = ClearancePenalty::new(contour, robot.bodies.len(), options.clearance, options.clearance_scale, 0.0);
+    let scratch = ClearancePenalty::new(contour, &robot, options.clearance, options.clearance_scale, 0.0);
     let mut objective =
         Objective::new(&robot, &field, Minco::new(pieces, &ends[0], &ends[1]), reverse, scratch, &options);
     let mut x = Vec::new();

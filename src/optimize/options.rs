@@ -8,12 +8,12 @@ use crate::math::lbfgs::LbfgsOptions;
 pub struct OptimizeOptions {
     /// Clearance to aim at, m: what must be certified plus a margin for what sampling misses. Default 0.05.
     pub clearance: f64,
-    /// A leg that ends with less than `clearance - clearance_tolerance` (m) at its contour points is driven stop, spin, go
-    /// instead. Default 0.02.
+    /// A leg that ends with less than `clearance - clearance_tolerance` (m) at its contour points is cut, and the robot stops where
+    /// it was worst. Default 0.02.
     pub clearance_tolerance: f64,
     /// Dense sampling on (\[SCR\] section IV-C). Default true.
     pub dense: bool,
-    /// kappa: sparse samples a piece. Default 12.
+    /// kappa: sparse samples a piece. Default 14.
     pub samples_per_piece: usize,
     /// kappa': dense samples a sparse interval; made even. Default 4.
     pub dense_samples: usize,
@@ -34,16 +34,18 @@ pub struct OptimizeOptions {
     pub clearance_scale: f64,
     /// Passes, each with weights `weight_growth` times the last where limits are still overstepped. Default 3.
     pub passes: usize,
-    /// See `passes`. Default 6.
+    /// See `passes`. Default 4.
     pub weight_growth: f64,
     /// A limit may be overstepped by this share before another pass. Default 0.02.
     pub motion_tolerance: f64,
     /// Clearance may be missed by this, m, before another pass. Default 0.002.
     pub pass_clearance_tolerance: f64,
-    /// Length of pieces on straights, m. Default 0.8.
+    /// Length of pieces on straights, m: one of degree 7 serves far. Default 1.6.
     pub piece_length: f64,
-    /// Waypoints stand this far from a corner, m, or 0.4 of the neighbouring straight. Default 0.2.
+    /// Waypoints stand this far from a corner, m, or 0.4 of the neighbouring straight. Default 0.25.
     pub corner_distance: f64,
+    /// A corner that could only be rounded at less than this share of the speed limit is a stop and a spin. Default 0.2.
+    pub slowest_corner: f64,
     /// Spins larger than this in the interior are driven as spins, rad. Default 100 degrees.
     pub spin_threshold: f64,
     /// The same at start and goal, where the position is fixed. Default 45 degrees.
@@ -58,7 +60,7 @@ impl Default for OptimizeOptions {
             clearance: 0.05,
             clearance_tolerance: 0.02,
             dense: true,
-            samples_per_piece: 12,
+            samples_per_piece: 14,
             dense_samples: 4,
             dense_below: 0.35,
             contour_spacing: None,
@@ -68,14 +70,15 @@ impl Default for OptimizeOptions {
             clearance_weight: 200.0,
             clearance_scale: 0.05,
             passes: 3,
-            weight_growth: 6.0,
+            weight_growth: 4.0,
             motion_tolerance: 0.02,
             pass_clearance_tolerance: 0.002,
-            piece_length: 0.8,
-            corner_distance: 0.2,
+            piece_length: 1.6,
+            corner_distance: 0.25,
+            slowest_corner: 0.2,
             spin_threshold: 100f64.to_radians(),
             end_spin_threshold: 45f64.to_radians(),
-            lbfgs: LbfgsOptions { first_step: 0.05, decrease_tolerance: 5e-4, past: 8, ..LbfgsOptions::default() },
+            lbfgs: LbfgsOptions { memory: 20, decrease_tolerance: 5e-4, past: 8, ..LbfgsOptions::default() },
         }
     }
 }

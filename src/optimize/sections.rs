@@ -35,17 +35,46 @@ pub(crate) struct Thresholds {
     pub interior: f64,
     /// Largest at start and goal, rad.
     pub ends: f64,
+    /// Spins are left where a curve could round them at no more than this share of the speed limit: it would all but stop too,
+    /// and be hard to find.
+    pub slowest: f64,
+    /// At most this distance from a corner is rounded, m.
+    pub reach: f64,
+    /// A state where the robot stands, whatever else holds.
+    pub cut: Option<usize>,
 }
 
 impl Thresholds {
     /// As the options say.
     pub fn of(options: &OptimizeOptions) -> Self {
-        Self { interior: options.spin_threshold, ends: options.end_spin_threshold }
+        Self {
+            interior: options.spin_threshold,
+            ends: options.end_spin_threshold,
+            slowest: options.slowest_corner,
+            reach: options.corner_distance,
+            cut: None,
+        }
     }
 
     /// No spin: stop, spin, go.
-    pub const NONE: Self = Self { interior: 0.0, ends: 0.0 };
+    #[cfg(test)]
+    pub const NONE: Self = Self { interior: 0.0, ends: 0.0, slowest: 1.0, reach: 0.0, cut: None };
+
+    /// Whether a corner of `angle` between straights of these lengths is better rounded than spun on the spot.
+    fn rounds(&self, angle: f64, before: f64, after: f64, limits: &Limits) -> bool {
+        if angle > self.interior {
+            return false;
+        }
+        let reach = self.reach.min(CORNER_SHARE * before.min(after));
+        let radius = reach / (0.5 * angle).tan().max(1e-6);
+        // omega = v / R meets Eq. 14: v = R slope (v_max - v).
+        let speed = radius * limits.turn_slope / (1.0 + radius * limits.turn_slope);
+        speed > self.slowest
+    }
 }
+
+/// A corner takes this share of the straights beside it.
+pub(crate) const CORNER_SHARE: f64 = 0.4;
 
 /// Sections of the moves `first..last` in order; together they cover them all.
 pub(crate) fn sections(
@@ -77,7 +106,10 @@ pub(crate) fn sections(
         let moved = Stand::of(path, at, end);
         let absorbed = match (&open, next) {
             (Some(drive), Some(reverse)) if drive.reverse == reverse => {
-                moved.turn <= thresholds.interior && joints_fit(path, at, end, &moved, limits, first, last)
+                let (before, after) = (run(path, (first..at).rev()), run(path, end..last));
+                thresholds.cut.is_none_or(|cut| !(at..=end).contains(&cut))
+                    && thresholds.rounds(moved.turn, before, after, limits)
+                    && joints_fit(path, at, end, &moved, limits, first, last)
             }
             (Some(_), None) | (None, Some(_)) => moved.turn <= thresholds.ends && moved.joints <= NOTHING,
             _ => false,
@@ -95,6 +127,14 @@ pub(crate) fn sections(
     }
     sections.extend(open.map(Section::Drive));
     sections
+}
+
+/// Length of the straight that goes on from here, up to the next stand, m.
+fn run(path: &SearchPath, moves: impl Iterator<Item = usize>) -> f64 {
+    moves
+        .take_while(|&i| path.moves[i] != SearchMove::Still)
+        .map(|i| path.states[i].pose.distance(path.states[i + 1].pose))
+        .sum()
 }
 
 /// The leg from one state to the next, on the spot.
@@ -188,7 +228,7 @@ mod tests {
             .collect()
     }
 
-    const SOME: Thresholds = Thresholds { interior: 1.75, ends: 0.8 };
+    const SOME: Thresholds = Thresholds { interior: 1.75, ends: 0.8, slowest: 0.05, reach: 0.3, cut: None };
 
     #[test]
     fn small_spins_are_driven_and_large_ones_are_spins() {

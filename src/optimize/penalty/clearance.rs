@@ -6,7 +6,7 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use super::Judge;
-use crate::optimize::contour::Contour;
+use crate::optimize::contour::{Contour, Reach};
 use crate::robot::RobotModel;
 
 /// A signed distance to obstacles, m.
@@ -45,10 +45,31 @@ struct BodyFrame {
     torque: Vector3<f64>,
 }
 
+/// Where the robot is: position (m), heading as (cos, sin), joint values.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Placement<'a> {
+    pub position: [f64; 2],
+    pub heading: [f64; 2],
+    pub joints: &'a [f64],
+}
+
+/// Values trilinearly interpolated from a 1-Lipschitz lattice change by at most this much a metre.
+const INTERPOLATION_SLOPE: f64 = 1.733;
+/// A patch that is clear by less than this (m) is looked at more closely, to learn how far its points may really move.
+const WORTH_A_LOOK: f64 = 0.02;
+
 /// Scratch memory and constants of the penalty.
+///
+/// Every sample of a curve remembers where it was last seen, and how far each shape may move from there before any of its points
+/// costs anything. A step of the optimiser is shorter than that nearly everywhere, so nearly all look-ups are spared.
 #[derive(Debug, Clone)]
 pub struct ClearancePenalty {
     contour: Contour,
+    /// How fast each shape's points move.
+    reaches: Vec<Reach>,
+    /// Per sample: x, y, cos, sin, joints; then per shape how far it may move, m.
+    memory: Vec<f64>,
+    joints: usize,
     clearance: f64,
     /// How much of `clearance` was not asked for at first, m.
     tightened: f64,
@@ -69,8 +90,9 @@ pub struct ByPose {
 }
 
 impl ClearancePenalty {
-    /// For `contour`, wanting `clearance` m in a field with cells of `cell` m; violations count in units of `scale` m.
-    pub fn new(contour: Contour, bodies: usize, clearance: f64, scale: f64, cell: f64) -> Self {
+    /// For `contour` of `robot`, wanting `clearance` m in a field with cells of `cell` m; violations count in units of `scale` m.
+    pub fn new(contour: Contour, robot: &RobotModel, clearance: f64, scale: f64, cell: f64) -> Self {
+        let bodies = robot.bodies.len();
         let frame = BodyFrame {
             rotation: Matrix3::identity(),
             origin: Vector3::zeros(),
@@ -78,6 +100,9 @@ impl ClearancePenalty {
             torque: Vector3::zeros(),
         };
         Self {
+            reaches: contour.shapes.iter().map(|shape| Reach::of(robot, shape)).collect(),
+            memory: Vec::new(),
+            joints: robot.joints.len(),
             contour,
             clearance,
             tightened: 0.0,
@@ -86,6 +111,21 @@ impl ClearancePenalty {
             poses: Vec::with_capacity(bodies),
             frames: vec![frame; bodies],
         }
+    }
+
+    /// Memory for samples `0..count`; nothing is known about them.
+    pub(crate) fn remember(&mut self, count: usize) {
+        self.memory = vec![f64::NEG_INFINITY; count * self.stride()];
+    }
+
+    /// Nothing is known about `sample` any more.
+    pub(crate) fn forget(&mut self, sample: usize) {
+        let stride = self.stride();
+        self.memory[sample * stride..(sample + 1) * stride].fill(f64::NEG_INFINITY);
+    }
+
+    fn stride(&self) -> usize {
+        4 + self.joints + self.reaches.len()
     }
 
     fn place(&mut self, robot: &RobotModel, heading: [f64; 2], q: &[f64]) {
@@ -100,31 +140,71 @@ impl ClearancePenalty {
         }
     }
 
-    /// Cost at a pose: position (m), heading as (cos, sin), joint values. Adds to `by_pose` and to `by_joints`.
+    /// Takes the way from where `sample` was last off what its shapes may move; whether one may have reached something.
+    fn moved(&mut self, at: Placement<'_>, sample: usize) -> bool {
+        let stride = self.stride();
+        let (pose, free) = self.memory[sample * stride..(sample + 1) * stride].split_at_mut(4 + self.joints);
+        if pose[0] == f64::NEG_INFINITY {
+            pose[..2].copy_from_slice(&at.position);
+            pose[2..4].copy_from_slice(&at.heading);
+            pose[4..].copy_from_slice(at.joints);
+            return true;
+        }
+        let way = (at.position[0] - pose[0]).hypot(at.position[1] - pose[1]);
+        // An angle is less than pi/2 of its chord.
+        let turn = std::f64::consts::FRAC_PI_2 * (at.heading[0] - pose[2]).hypot(at.heading[1] - pose[3]);
+        let mut near = false;
+        for (free, reach) in free.iter_mut().zip(&self.reaches) {
+            let mut far = way + reach.radius * turn;
+            for ((lever, to), from) in reach.joints.iter().zip(at.joints).zip(&pose[4..]) {
+                far += lever * (to - from).abs();
+            }
+            *free -= far;
+            // Not `<`: NaN is looked at.
+            near |= free.is_nan() || *free <= 0.0;
+        }
+        pose[..2].copy_from_slice(&at.position);
+        pose[2..4].copy_from_slice(&at.heading);
+        pose[4..].copy_from_slice(at.joints);
+        near
+    }
+
+    /// Cost at a place that is a step of `sample` away from where it was last. Adds to `by_pose` and to `by_joints`.
     #[allow(clippy::too_many_arguments)]
     pub(crate) fn add(
         &mut self,
         robot: &RobotModel,
         field: &impl DistanceField,
-        position: [f64; 2],
-        heading: [f64; 2],
-        q: &[f64],
+        at: Placement<'_>,
+        sample: usize,
         judge: &mut impl Judge,
         by_pose: &mut ByPose,
         by_joints: &mut [f64],
     ) -> f64 {
-        self.place(robot, heading, q);
-        let base = Vector3::new(position[0], position[1], 0.0);
+        if !self.moved(at, sample) {
+            return 0.0;
+        }
+        self.place(robot, at.heading, at.joints);
+        let stride = self.stride();
+        let free = &mut self.memory[sample * stride + 4 + self.joints..(sample + 1) * stride];
+        let base = Vector3::new(at.position[0], at.position[1], 0.0);
         let mut sum = 0.0;
         let mut touched = false;
-        for shape in &self.contour.shapes {
+        for (shape, free) in self.contour.shapes.iter().zip(free) {
+            if *free > 0.0 {
+                continue;
+            }
             let frame = &mut self.frames[shape.body];
             let placed = |p: &Point3<f64>| frame.rotation * p.coords + frame.origin;
             let (mut force, mut torque) = (Vector3::zeros(), Vector3::zeros());
             let mut node = 0;
+            *free = f64::INFINITY;
             while let Some(patch) = shape.patches.get(node) {
                 let centre = placed(&patch.centre) + base;
-                if field.distance(centre.into()) > self.clearance + patch.radius + self.slack {
+                let spare = field.distance(centre.into()) - self.clearance;
+                let spare = (spare - patch.radius - self.slack).max(spare / INTERPOLATION_SLOPE - patch.radius);
+                if spare > if patch.leaf { 0.0 } else { WORTH_A_LOOK } {
+                    *free = free.min(spare);
                     node = patch.skip_to;
                     continue;
                 }
@@ -135,7 +215,9 @@ impl ClearancePenalty {
                 for point in &self.contour.points[patch.first..patch.last] {
                     let arm = placed(&point.at);
                     let (distance, gradient) = field.distance_gradient((arm + base).into());
-                    let (cost, slope) = judge.weigh((self.clearance + point.radius - distance) / self.scale);
+                    let short = self.clearance + point.radius - distance;
+                    *free = free.min(-short / INTERPOLATION_SLOPE);
+                    let (cost, slope) = judge.weigh(short / self.scale);
                     sum += cost;
                     if slope != 0.0 {
                         let push = Vector3::from(gradient) * (-slope / self.scale);
@@ -183,6 +265,7 @@ impl ClearancePenalty {
     pub(crate) fn tighten(&mut self, by: f64) {
         self.clearance += by;
         self.tightened += by;
+        self.memory.fill(f64::NEG_INFINITY);
     }
 
     /// The worst constraint value as metres missed of the clearance first asked for.
@@ -200,16 +283,21 @@ mod tests {
 
     proptest! {
         #[test]
-        fn dismissing_patches_changes_no_cost(x in -1.0..1.0f64, y in -1.0..1.0f64, yaw in -3.0..3.0f64, q in 0.0..3.0f64) {
+        fn dismissing_patches_changes_no_cost(x in -1.0..1.0f64, y in -1.0..1.0f64, yaw in -3.0..3.0f64, q in 0.0..3.0f64, step in proptest::array::uniform3(-0.3..0.3f64)) {
             let robot = robot(2);
             let field = Boxes(vec![([0.5, 0.4, 0.0], [0.7, 1.5, 1.0]), ([-0.9, -0.8, 0.3], [0.0, -0.5, 0.5])]);
             let contour = Contour::new(&robot, 0.06);
-            let mut penalty = ClearancePenalty::new(contour.clone(), robot.bodies.len(), 0.15, 0.05, 0.0);
+            let mut penalty = ClearancePenalty::new(contour.clone(), &robot, 0.15, 0.05, 0.0);
+            penalty.remember(1);
             let joints = [q, 0.1];
             let (mut by_pose, mut by_joints) = (ByPose::default(), [0.0; 2]);
             let heading = [yaw.cos(), yaw.sin()];
             let judge = &mut Penalise(0.1);
-            let cost = penalty.add(&robot, &field, [x, y], heading, &joints, judge, &mut by_pose, &mut by_joints);
+            // Comes from some other place, which it remembers.
+            let from = Placement { position: [x + step[0], y + step[1]], heading: [0.6, 0.8], joints: &[q + step[2], 0.0] };
+            penalty.add(&robot, &field, from, 0, judge, &mut by_pose, &mut by_joints);
+            let at = Placement { position: [x, y], heading, joints: &joints };
+            let cost = penalty.add(&robot, &field, at, 0, judge, &mut by_pose, &mut by_joints);
             let mut poses = Vec::new();
             robot.body_poses(&joints, &mut poses);
             let base = crate::geom::Pose2::new(x, y, yaw).isometry();
