@@ -16,6 +16,8 @@ use super::{Query, SearchOptions};
 pub(super) const TRIES: usize = 6;
 /// Clearance of the base's core beyond which more is no better, m.
 const ROOM: f64 = 0.5;
+/// What touching costs over having that room, in tenths of a straight step, try by try: first the short way, then the middle.
+const TIGHT: [u32; 3] = [10, 30, 80];
 /// Corners are kept where the way bends by more than this, m: coarse on the first try, fine later.
 const BEND: [f64; 2] = [0.04, 0.02];
 /// What a place that blocked a route costs more, and how far about it (m).
@@ -23,22 +25,21 @@ const BLOCKED: (u32, f64) = (6, 0.2);
 
 pub(super) struct Guide<'a> {
     lattice: &'a Lattice,
-    /// Cost of a step to each position, in tenths of a straight step; 0: not passable.
-    costs: Vec<u32>,
+    /// How tight each position is, in 255ths; `None`: not passable.
+    tight: Vec<Option<u8>>,
+    /// What blocked places cost more.
+    factors: Vec<u32>,
 }
 
 impl<'a> Guide<'a> {
     /// `clearances`: of the base's core at each position; where it is below `least` nothing passes.
     pub fn new(lattice: &'a Lattice, clearances: &[f32], least: f64) -> Self {
-        let cost = |clearance: &f32| {
+        let tight = |clearance: &f32| {
             let room = f64::from(*clearance) - least;
-            if room < 0.0 {
-                return 0;
-            }
-            let tight = ((ROOM - room) / ROOM).max(0.0);
-            10 + (80.0 * tight * tight) as u32
+            let tight = ((ROOM - room) / ROOM).clamp(0.0, 1.0);
+            (room >= 0.0).then_some((255.0 * tight * tight) as u8)
         };
-        Self { lattice, costs: clearances.iter().map(cost).collect() }
+        Self { lattice, tight: clearances.iter().map(tight).collect(), factors: vec![1; clearances.len()] }
     }
 
     /// The route along the cheapest way. `None`: there is none in the plane.
@@ -46,7 +47,8 @@ impl<'a> Guide<'a> {
         if options.reverse && attempt > 2 {
             return None; // backing up may be what it takes: leave that to the search
         }
-        let way = self.way([query.start.x, query.start.y], [query.goal.x, query.goal.y])?;
+        let ends = [[query.start.x, query.start.y], [query.goal.x, query.goal.y]];
+        let way = self.way(ends, TIGHT[attempt.min(TIGHT.len() - 1)])?;
         let mut route = Route::new(query.start);
         let goal = [query.goal.x, query.goal.y];
         let mut kept = vec![[query.start.x, query.start.y]];
@@ -69,15 +71,15 @@ impl<'a> Guide<'a> {
             for j in range(1) {
                 let near = (f64::from(i) - at[0]).hypot(f64::from(j) - at[1]) <= reach;
                 if near && self.lattice.contains(i, j) {
-                    let cost = &mut self.costs[self.lattice.index(i, j)];
-                    *cost = cost.saturating_mul(factor).min(100_000);
+                    let own = &mut self.factors[self.lattice.index(i, j)];
+                    *own = own.saturating_mul(factor).min(1_000);
                 }
             }
         }
     }
 
     /// Positions of the cheapest way between the lattice positions nearest to two points.
-    fn way(&self, from: [f64; 2], to: [f64; 2]) -> Option<Vec<[f64; 2]>> {
+    fn way(&self, [from, to]: [[f64; 2]; 2], touching: u32) -> Option<Vec<[f64; 2]>> {
         let lattice = self.lattice;
         let nearest = |p: [f64; 2]| {
             let [i, j] = lattice.coordinates(p[0], p[1]).map(|v| v.round() as i32);
@@ -88,8 +90,8 @@ impl<'a> Guide<'a> {
             let (di, dj) = ((i - to.0).unsigned_abs(), (j - to.1).unsigned_abs());
             10 * di.max(dj) + 4 * di.min(dj)
         };
-        let mut best = vec![u32::MAX; self.costs.len()];
-        let mut came = vec![u8::MAX; self.costs.len()];
+        let mut best = vec![u32::MAX; self.tight.len()];
+        let mut came = vec![u8::MAX; self.tight.len()];
         best[lattice.index(from.0, from.1)] = 0;
         let mut open = BinaryHeap::from([Reverse((to_go(from), from))]);
         while let Some(Reverse((estimate, at))) = open.pop() {
@@ -106,10 +108,9 @@ impl<'a> Guide<'a> {
                     continue;
                 }
                 let index = lattice.index(next.0, next.1);
-                if self.costs[index] == 0 {
-                    continue;
-                }
-                let cost = own.saturating_add(self.costs[index] * length / 10);
+                let Some(tight) = self.tight[index] else { continue };
+                let step = (10 + touching * u32::from(tight) / 255) * self.factors[index] * length / 10;
+                let cost = own.saturating_add(step);
                 if cost < best[index] {
                     best[index] = cost;
                     came[index] = k as u8;
@@ -171,10 +172,10 @@ mod tests {
             })
             .collect();
         let mut guide = Guide::new(&lattice, &clearances, 0.02);
-        let middle = guide.way([0.3, 1.0], [2.7, 1.0]).expect("free");
+        let middle = guide.way([[0.3, 1.0], [2.7, 1.0]], 80).expect("free");
         assert!(middle.iter().all(|p| (p[1] - 1.0).abs() < 0.06), "{middle:?}");
         guide.avoid([1.5, 1.0]);
-        let around = guide.way([0.3, 1.0], [2.7, 1.0]).expect("free");
+        let around = guide.way([[0.3, 1.0], [2.7, 1.0]], 80).expect("free");
         assert!(around.iter().all(|p| (p[0] - 1.5).hypot(p[1] - 1.0) > 0.19), "{around:?}");
     }
 
