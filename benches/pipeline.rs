@@ -16,16 +16,11 @@ use trajc::geom::Pose2;
 use trajc::map::VoxelMap;
 use trajc::mission::{Mission, PoseSpec};
 use trajc::optimize::{self, OptimizeOptions};
-use trajc::pipeline::{self, CompileOptions, World};
+use trajc::pipeline::{self, CompileOptions, OPTIMISER_MARGINS, SEARCH_MARGIN, World};
 use trajc::retime::{self, RetimeOptions};
 use trajc::robot::RobotModel;
 use trajc::search::{self, Query, SearchOptions, SearchPath};
 use trajc::trajectory::Trajectory;
-
-/// Clearance beyond the mission's that the pipeline asks of the search, m.
-const SEARCH_MARGIN: f64 = 2e-3;
-/// The same of the optimiser, one try after the other, m.
-const OPTIMISER_MARGINS: [f64; 3] = [0.01, 0.02, 0.04];
 
 /// The mission and what its files hold.
 struct Bench {

@@ -115,6 +115,7 @@ fn motion(out: &mut String, report: &Report) {
     if let Some(trajectory) = &report.trajectory {
         parts.push(match trajectory.source.as_str() {
             "optimised" => format!("optimised, {}", counted(trajectory.pieces, "piece")),
+            "search" if report.search.as_ref().is_some_and(|s| s.length_m == 0.0) => "on the spot".to_string(),
             "search" => "the search's own (stop, turn, go): no smooth one could be certified".to_string(),
             _ => format!("given, {}", counted(trajectory.pieces, "piece")),
         });

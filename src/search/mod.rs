@@ -170,7 +170,7 @@ fn blocked(contact: &Contact, clearance: f64) -> String {
 
 fn narrowest_way(narrowest: &Option<(f64, [f64; 2])>, core: f64) -> String {
     match narrowest {
-        Some((radius, [x, y])) if *radius > 0.0 => {
+        Some((radius, [x, y])) if *radius > 1e-3 => {
             format!(
                 "; the widest way there narrows to {:.2} m about ({x:.2}, {y:.2}), the base needs {:.2} m",
                 2.0 * radius,
