@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Top to bottom, as in `src/lib.rs`. A module may name itself and those before it.
-const ORDER: [&str; 18] = [
+const ORDER: [&str; 19] = [
     "math",
     "geom",
     "diag", // for everyone
@@ -21,6 +21,7 @@ const ORDER: [&str; 18] = [
     "report",
     "emit", // stages
     "pipeline",
+    "eval",
     "cli",
     "main",
 ];

@@ -1,6 +1,6 @@
 //! Scenes: boxes in a room, start and goal.
 
-use std::collections::HashSet;
+use std::collections::BTreeSet;
 
 use super::fault::ScenesError;
 use crate::diag::Diagnostics;
@@ -111,7 +111,7 @@ impl SceneSet {
 
     /// The first id that is there twice.
     pub(super) fn repeated_id(&self) -> Option<(usize, &str)> {
-        let mut seen = HashSet::new();
+        let mut seen = BTreeSet::new();
         self.scenes.iter().enumerate().find(|(_, s)| !seen.insert(&s.id)).map(|(i, s)| (i, s.id.as_str()))
     }
 }
