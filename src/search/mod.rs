@@ -130,10 +130,7 @@ pub enum SearchError {
         bounds: [f64; 4],
     },
     /// Every state that can be reached was looked at.
-    #[error(
-        "no way to the goal: all {expanded} states that can be reached on the lattice (5 cm, 5 degrees, 64 postures a joint) \
-         were searched{}", narrowest_way(.narrowest, *.core)
-    )]
+    #[error("no way to the goal: {}{}", how_absent(*.expanded, .narrowest, *.core), narrowest_way(.narrowest, *.core))]
     Exhausted {
         /// States expanded.
         expanded: usize,
@@ -143,6 +140,12 @@ pub enum SearchError {
         narrowest: Option<(f64, [f64; 2])>,
         /// Radius of the base's core plus clearance: what would have to fit at least, m.
         core: f64,
+    },
+    /// The search's route does not pass the final check: it is free by less than the checks' tolerance.
+    #[error("the way found keeps the clearance by less than the checks' own tolerance ({expanded} states searched)")]
+    Marginal {
+        /// States expanded.
+        expanded: usize,
     },
     /// Out of memory that the search allows itself.
     #[error("gave up after {labels} partial paths: neither a way was found nor its absence proven")]
@@ -165,6 +168,18 @@ fn blocked(contact: &Contact, clearance: f64) -> String {
         format!("in collision: link `{link}` is {:.3} m deep in {with}", -contact.clearance)
     } else {
         format!("too close: link `{link}` has {:.3} m to {with}, {clearance} m are asked for", contact.clearance)
+    }
+}
+
+fn how_absent(expanded: usize, narrowest: &Option<(f64, [f64; 2])>, core: f64) -> String {
+    if expanded == 0 && narrowest.is_some_and(|(radius, _)| radius < core) {
+        "not even a disc as wide as the base gets there".to_owned()
+    } else if expanded == 0 {
+        "the robot cannot leave its start by any move of the lattice (5 cm, 5 degrees)".to_owned()
+    } else {
+        format!(
+            "all {expanded} states that can be reached on the lattice (5 cm, 5 degrees, 64 values of a joint) were searched"
+        )
     }
 }
 
@@ -215,6 +230,9 @@ impl Describe for SearchError {
                 }
                 d
             }
+            Self::Marginal { expanded } => Diagnostic::failure("search/marginal", self)
+                .hint("lower `clearance_m` by a millimetre")
+                .number("expanded", *expanded),
             Self::Limit { labels } => Diagnostic::failure("search/limit", self)
                 .hint("use a coarser map or split the mission")
                 .number("labels", *labels),
@@ -341,7 +359,7 @@ fn search_postures<const W: usize>(
         }
     }
     // The fine check asks no more than the strict search did, but for the tolerance of the checks.
-    Err(SearchError::Limit { labels: expanded_before })
+    Err(SearchError::Marginal { expanded: expanded_before })
 }
 
 /// Postures that are free in a pose and agree with what is asked for; else what is in the way of the posture asked for.
