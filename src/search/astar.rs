@@ -134,7 +134,7 @@ pub(super) fn straight_to_goal<'a>(query: &'a Query, options: &'a SearchOptions)
 /// Spin, drive, spin to the goal: forward, and backwards where allowed.
 fn shots<'a>(from: Pose2, query: &'a Query, options: &SearchOptions) -> impl Iterator<Item = (Route, bool)> + 'a {
     let senses: &[bool] = if options.reverse { &[false, true] } else { &[false] };
-    senses.to_vec().into_iter().map(move |reverse| {
+    senses.iter().copied().map(move |reverse| {
         let mut route = Route::new(from);
         route.drive_to([query.goal.x, query.goal.y], reverse);
         route.end_with(query.goal_yaw);
