@@ -1,20 +1,26 @@
 //! `compile()`: every stage, in order. Read this file first.
 
+mod check;
+mod world;
+
+pub use check::{check, driven, path_error_of_commands};
+pub use world::world;
+
 use std::time::Instant;
 
 use crate::certify::{self, Certificate, Goal, RefusalKind, Task};
 use crate::command::{self, CommandTable, SampleOptions};
-use crate::diag::{Diagnostic, Diagnostics, Span, nearest};
+use crate::diag::{Diagnostic, Diagnostics};
 use crate::esdf;
 use crate::geom::{Pose2, wrap_angle};
-use crate::map::{self, MapInputs, VoxelMap};
+use crate::map::VoxelMap;
 use crate::mission::{Mission, PathSpec, PoseSpec};
 use crate::optimize::{self, OptimizeOptions};
 use crate::report::schema::{InitialPart, ProfilePart, SearchPart, TrajectoryPart};
 use crate::report::schema::{InputFile, InputsPart};
-use crate::report::{Metrics, Report, metrics, path_error};
+use crate::report::{Report, metrics, path_error};
 use crate::retime::{self, MotionProfile, RetimeOptions};
-use crate::robot::{self, Files, RobotInputs, RobotModel, spec::RobotSpec};
+use crate::robot::{Files, RobotModel, spec::RobotSpec};
 use crate::search::{self, Query, SearchError, SearchOptions, SearchPath};
 use crate::trajectory::{Leg, Trajectory, TrajectorySource, given};
 
@@ -203,68 +209,6 @@ fn stages(
         run.report.path_error = rows?;
     }
     Ok(Compiled { robot: robot.clone(), trajectory, commands, certificate })
-}
-
-/// The robot and the map, checked against what the mission says of them.
-///
-/// # Errors
-/// All faults found.
-pub fn world(inputs: &mut Inputs) -> Result<World, Diagnostics> {
-    let mission = &inputs.mission;
-    let robot = robot::parse(RobotInputs {
-        spec: &inputs.robot_spec,
-        urdf: (&inputs.urdf.name, &inputs.urdf.text),
-        files: inputs.files.as_mut(),
-        overrides: &mission.limits,
-    })?;
-    let faults = unknown_joints(mission, &robot);
-    if !faults.is_empty() {
-        return Err(Diagnostics(faults));
-    }
-    let map = match (&mission.map, &inputs.map) {
-        (Some(spec), Some(file)) => {
-            let beside = file.beside.as_ref().map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
-            let inputs = MapInputs { name: &file.name, bytes: &file.bytes, beside };
-            Some(map::parse(&inputs, spec, robot.top_over_all_postures())?)
-        }
-        _ => None,
-    };
-    Ok(World { robot, map })
-}
-
-/// Joints that the mission names and the robot does not move, or cannot hold at that value.
-fn unknown_joints(mission: &Mission, robot: &RobotModel) -> Vec<Diagnostic> {
-    let names: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
-    let span = |under: &str, name: &str| -> Option<&Span> {
-        mission.spans.joints.iter().find(|j| j.under == under && j.name == name).map(|j| &j.at)
-    };
-    let mut faults = Vec::new();
-    for (under, pose) in [("start", &mission.start), ("goal", &mission.goal)] {
-        for (name, value) in pose.iter().flat_map(|p| &p.joints) {
-            let Some(joint) = robot.joints.iter().find(|j| j.name == *name) else {
-                let hint = match nearest(name, names.iter().copied()) {
-                    Some(known) => format!("did you mean `{known}`?"),
-                    None if names.is_empty() => "this robot has no moving joint".to_owned(),
-                    None => format!("moving joints: {}", names.join(", ")),
-                };
-                let message = format!("`{under}.joints` names `{name}`, which is no moving joint of `{}`", robot.name);
-                faults.push(Diagnostic::error("mission/unknown-joint", message).maybe_at(span(under, name)).hint(hint));
-                continue;
-            };
-            if *value < joint.lower - 1e-9 || *value > joint.upper + 1e-9 {
-                let message = format!(
-                    "`{under}.joints.{name}` is {value}, outside its limits {} to {}",
-                    joint.lower, joint.upper
-                );
-                faults.push(
-                    Diagnostic::error("mission/joint-out-of-limits", message)
-                        .maybe_at(span(under, name))
-                        .hint("angles are radians, or with `deg`"),
-                );
-            }
-        }
-    }
-    faults
 }
 
 /// A trajectory timed, sampled and judged.
@@ -502,94 +446,4 @@ fn inputs_part(inputs: &Inputs) -> InputsPart {
         map: mission.map.as_ref().zip(map).map(|(spec, m)| file(&spec.file.display().to_string(), &m.bytes)),
         other,
     }
-}
-
-/// Judges commands that this program did not plan, against a mission's robot, map, limits, start and goal.
-///
-/// # Errors
-/// Bad inputs; joints of the table that are not the robot's.
-pub fn check(inputs: &mut Inputs, table: &CommandTable) -> Result<Certificate, Diagnostics> {
-    let World { robot, map } = world(inputs)?;
-    let mission = &inputs.mission;
-    let expected: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
-    let found: Vec<&str> = table.joints.iter().map(|(name, _)| name.as_str()).collect();
-    if expected != found {
-        let message =
-            format!("the commands move joints [{}], the robot has [{}]", found.join(", "), expected.join(", "));
-        return Err(Diagnostic::error("check/joints", message).into());
-    }
-    let Some(first) = table.rows.first() else {
-        return Err(Diagnostic::error("check/empty", "the command file has no row").into());
-    };
-    let (start, goal) = match &mission.path {
-        Some(path) => {
-            let trajectory = given_path(mission, path, inputs.path_csv.as_ref(), &robot)?;
-            (Some(start_of(&trajectory)), Some(end_of(&trajectory)))
-        }
-        None => (None, None),
-    };
-    let asked = |pose: &Option<PoseSpec>, f: fn(&PoseSpec) -> Option<f64>| pose.as_ref().and_then(f);
-    let start_pose = match &start {
-        Some((pose, _)) => *pose,
-        None => Pose2::new(
-            asked(&mission.start, |p| p.x).unwrap_or(first.pose.x),
-            asked(&mission.start, |p| p.y).unwrap_or(first.pose.y),
-            asked(&mission.start, |p| p.yaw).unwrap_or(first.pose.yaw),
-        ),
-    };
-    let joint = |pose: &Option<PoseSpec>, name: &str| pose.as_ref().and_then(|p| p.joints.get(name).copied());
-    let start_joints = robot
-        .joints
-        .iter()
-        .zip(&first.joint_positions)
-        .map(|(j, own)| joint(&mission.start, &j.name).unwrap_or(*own))
-        .collect();
-    let task = Task {
-        start: start_pose,
-        start_joints,
-        goal: Goal {
-            x: asked(&mission.goal, |p| p.x).or(goal.map(|g| g.x)).unwrap_or(first.pose.x),
-            y: asked(&mission.goal, |p| p.y).or(goal.map(|g| g.y)).unwrap_or(first.pose.y),
-            yaw: asked(&mission.goal, |p| p.yaw).or(goal.map(|g| g.yaw)),
-            joints: robot.joints.iter().map(|j| joint(&mission.goal, &j.name)).collect(),
-        },
-        clearance: mission.clearance,
-    };
-    Ok(certify::certify(table, &robot, map.as_ref(), &task))
-}
-
-/// The path error of commands as they are written: their replay against the mission's given path, or, where the path was
-/// planned, against the table's own planned poses.
-///
-/// # Errors
-/// Bad inputs.
-pub fn path_error_of_commands(
-    inputs: &mut Inputs,
-    table: &CommandTable,
-) -> Result<crate::report::PathErrorRow, Diagnostics> {
-    let World { robot, .. } = world(inputs)?;
-    let mission = &inputs.mission;
-    let Some(first) = table.rows.first() else {
-        return Err(Diagnostic::error("check/empty", "the command file has no row").into());
-    };
-    let trajectory = match &mission.path {
-        Some(path) => given_path(mission, path, inputs.path_csv.as_ref(), &robot)?,
-        None => planned_poses(table),
-    };
-    let options = RetimeOptions { law: crate::mission::TimeLaw::Auto, sampling_time: table.sampling_time };
-    let reference = path_error::PathReference::new(&retime::retime(&trajectory, &robot, &options)?);
-    let (start, _) = start_of(&trajectory);
-    let start = if mission.path.is_some() { start } else { first.pose };
-    Ok((&path_error::path_error_of_table(table, start, &reference)).into())
-}
-
-/// The planned poses of a table as straight drives and spins: what is left of a plan in a command file.
-fn planned_poses(table: &CommandTable) -> Trajectory {
-    let states = table.rows.iter().map(|row| (row.pose, row.joint_positions.clone())).collect::<Vec<_>>();
-    crate::trajectory::through_poses(&states)
-}
-
-/// Length and time of the mission's held commands; for tools.
-pub fn driven(commands: &CommandTable) -> Metrics {
-    metrics::of_commands(commands)
 }

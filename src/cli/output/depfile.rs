@@ -91,12 +91,12 @@ mod tests {
 
     #[test]
     fn paths_are_spelled_from_the_start_without_detours() {
-        let start = Path::new("/work/here");
+        let start = Path::new("/home/here");
         for (path, wanted) in [
             ("missions/../robots/r.yaml", "robots/r.yaml"),
             ("./out//a/commands.csv", "out/a/commands.csv"),
-            ("/work/here/maps/m.pcd", "maps/m.pcd"),
-            ("/work/there/../here/maps/m.pcd", "maps/m.pcd"),
+            ("/home/here/maps/m.pcd", "maps/m.pcd"),
+            ("/home/there/../here/maps/m.pcd", "maps/m.pcd"),
             ("../maps/./m.pcd", "../maps/m.pcd"),
             ("a/../../maps/m.pcd", "../maps/m.pcd"),
             ("/../m.pcd", "/m.pcd"),
