@@ -126,9 +126,16 @@ pub(super) struct AStar<'a, const W: usize> {
     pub goal_postures: Bits<W>,
 }
 
-/// Routes straight from start to goal, not yet checked.
-pub(super) fn straight_to_goal<'a>(query: &'a Query, options: &'a SearchOptions) -> impl Iterator<Item = Route> + 'a {
-    shots(query.start, query, options).map(|(route, _)| route)
+/// Routes straight from start to goal, not yet checked, the cheapest first.
+pub(super) fn straight_to_goal(query: &Query, options: &SearchOptions) -> Vec<Route> {
+    let mut routes: Vec<Route> = shots(query.start, query, options).map(|(route, _)| route).collect();
+    routes.sort_by(|a, b| worth(a).total_cmp(&worth(b)));
+    routes
+}
+
+/// What a route is worth, m.
+pub(super) fn worth(route: &Route) -> f64 {
+    route.cost(TURN_COST, REVERSE_COST)
 }
 
 /// Spin, drive, spin to the goal: forward, and backwards where allowed.
@@ -245,7 +252,7 @@ impl<const W: usize> AStar<'_, W> {
                     return None;
                 }
                 let reached = self.pass(postures, pieces).and(self.goal_postures);
-                (!reached.is_empty()).then(|| (route.cost(TURN_COST, REVERSE_COST), reverse))
+                (!reached.is_empty()).then(|| (worth(&route), reverse))
             })
             .collect();
         for (more, reverse) in found {
@@ -297,7 +304,7 @@ impl<const W: usize> AStar<'_, W> {
                     let postures = self.pass(self.start_postures, route.pieces(Grain::COARSE));
                     if !postures.is_empty() {
                         let state = LatticeState { i, j, heading };
-                        let cost = route.cost(TURN_COST, REVERSE_COST);
+                        let cost = worth(&route);
                         let reverse_drive = if reverse { Step::Drive { reverse } } else { Step::Start };
                         self.push(run, Label { state, parent: NO_PARENT, cost, postures, step: reverse_drive });
                     }

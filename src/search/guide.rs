@@ -7,6 +7,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use super::astar::worth;
 use super::heuristic::NEIGHBOURS;
 use super::lattice::Lattice;
 use super::route::Route;
@@ -49,16 +50,19 @@ impl<'a> Guide<'a> {
         }
         let ends = [[query.start.x, query.start.y], [query.goal.x, query.goal.y]];
         let way = self.way(ends, TIGHT[attempt.min(TIGHT.len() - 1)])?;
-        let mut route = Route::new(query.start);
-        let goal = [query.goal.x, query.goal.y];
-        let mut kept = vec![[query.start.x, query.start.y]];
-        kept.extend(way);
-        kept.push(goal);
-        for point in corners(&kept, BEND[attempt.min(1)]) {
-            route.drive_to(point, false);
-        }
-        route.end_with(query.goal_yaw);
-        Some(route)
+        let mut points = vec![[query.start.x, query.start.y]];
+        points.extend(way);
+        points.push([query.goal.x, query.goal.y]);
+        let corners = corners(&points, BEND[attempt.min(1)]);
+        let driven = |reverse: bool| {
+            let mut route = Route::new(query.start);
+            corners.iter().for_each(|point| route.drive_to(*point, reverse));
+            route.end_with(query.goal_yaw);
+            route
+        };
+        let forward = driven(false);
+        let backward = options.reverse.then(|| driven(true)).filter(|b| worth(b) < worth(&forward));
+        Some(backward.unwrap_or(forward))
     }
 
     /// Makes the surroundings of a place expensive.

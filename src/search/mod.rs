@@ -158,10 +158,10 @@ fn search_postures<const W: usize>(
         let pieces = checked.route.pieces(grain);
         Ok(with_joints(collider, robot, query, &checked, &pieces, [start_postures, goal_postures], expanded))
     };
-    if let Some(path) =
-        astar::straight_to_goal(query, options).find_map(|route| finish(&route, Grain::COARSE, &collider, 0).ok())
-    {
-        return Ok(path);
+    for route in astar::straight_to_goal(query, options) {
+        if let Ok(path) = finish(&route, Grain::COARSE, &collider, 0) {
+            return Ok(path);
+        }
     }
     let lattice = Lattice::new(map);
     let core = heuristic::Core::new(robot);

@@ -231,6 +231,22 @@ fn the_start_and_goal_postures_asked_for_are_kept_exactly() {
     assert_eq!(path.states[0].pose, query.start);
 }
 
+#[test]
+fn a_goal_straight_behind_is_backed_up_to_where_that_is_allowed() {
+    let robot = scr_db();
+    let map = VoxelMap::new(0.05, [0.0; 3], [60, 40, 20], Unknown::Occupied);
+    let esdf = crate::esdf::build(&map);
+    let goal = Pose2::new(0.9, 1.0, 0.0);
+    let query = Query { start: Pose2::new(1.7, 1.0, 0.0), goal, goal_yaw: Some(0.0), ..across(None) };
+    let moves = |reverse| {
+        let path =
+            search(&map, &esdf, &robot, &query, &SearchOptions { clearance: 0.03, reverse }).expect("an empty room");
+        path.moves
+    };
+    assert!(moves(true).iter().all(|m| *m == SearchMove::Reverse), "{:?}", moves(true));
+    assert!(moves(false).iter().all(|m| *m != SearchMove::Reverse));
+}
+
 /// Whether a lattice state is reached by plain breadth-first search with every move sampled.
 fn reachable(map: &VoxelMap, robot: &RobotModel, from: LatticeState, to: LatticeState, clearance: f64) -> bool {
     let lattice = Lattice::new(map);
