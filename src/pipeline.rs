@@ -3,7 +3,7 @@
 mod check;
 mod world;
 
-pub use check::{check, driven, path_error_of_commands};
+pub use check::{check, path_error_of_commands};
 pub use world::world;
 
 use std::time::Instant;
@@ -21,7 +21,7 @@ use crate::report::schema::{InputFile, InputsPart};
 use crate::report::{Report, metrics, path_error};
 use crate::retime::{self, MotionProfile, RetimeOptions};
 use crate::robot::{Files, RobotModel, spec::RobotSpec};
-use crate::search::{self, Query, SearchError, SearchOptions, SearchPath};
+use crate::search::{self, Query, SearchError, SearchOptions};
 use crate::trajectory::{Leg, Trajectory, TrajectorySource, given};
 
 /// A text file that was read.
@@ -136,9 +136,7 @@ impl Run<'_> {
         }
         out
     }
-}
 
-impl Run<'_> {
     fn end(self, result: Result<Compiled, Diagnostics>) -> Outcome {
         let Run { mut report, timings, .. } = self;
         match result {
@@ -219,12 +217,6 @@ struct Made {
     certificate: Certificate,
 }
 
-impl Made {
-    fn if_certified(self) -> Result<Self, ()> {
-        if self.certificate.holds() { Ok(self) } else { Err(()) }
-    }
-}
-
 /// Searches and optimises until something is certified; the search's own path is the last try.
 fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, dense: bool) -> Result<Made, Diagnostics> {
     let (mission, robot) = (finish.mission, finish.robot);
@@ -241,22 +233,18 @@ fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, dense: bool) -> 
     let path = found.map_err(|error| place_search_error(mission, &error))?;
     run.report.search = Some(SearchPart::from(&path));
     run.report.initial = Some(InitialPart { metrics: metrics::of_search(&path, robot) });
-    if !path_moves(&path) {
+    if path.length() == 0.0 {
         return finish.certify(run, path.trajectory());
     }
     for margin in OPTIMISER_MARGINS {
         let options = OptimizeOptions { clearance: mission.clearance + margin, dense, ..Default::default() };
         let trajectory = run.stage("optimize", || optimize::optimize(&path, &field, robot, &options));
         // A trajectory that no law can time is one more reason to go on to the next try.
-        if let Ok(made) = finish.certify(run, trajectory).map_err(drop).and_then(Made::if_certified) {
+        if let Some(made) = finish.certify(run, trajectory).ok().filter(|made| made.certificate.holds()) {
             return Ok(made);
         }
     }
     finish.certify(run, path.trajectory())
-}
-
-fn path_moves(path: &SearchPath) -> bool {
-    path.length() > 0.0
 }
 
 /// What comes after planning: time law, sampling, proof, path error.
@@ -286,17 +274,8 @@ impl Finish<'_> {
 
     fn task(&self, trajectory: &Trajectory) -> Task {
         let (start, start_joints) = start_of(trajectory);
-        let planned = end_of(trajectory);
-        let goal = self.mission.goal.as_ref();
-        let goal_of = |f: fn(&PoseSpec) -> Option<f64>| goal.and_then(f);
-        let open_heading = self.mission.path.is_none() && goal_of(|g| g.yaw).is_none();
-        let joints = self.robot.joints.iter().map(|j| goal.and_then(|g| g.joints.get(&j.name).copied())).collect();
-        let goal = Goal {
-            x: goal_of(|g| g.x).unwrap_or(planned.x),
-            y: goal_of(|g| g.y).unwrap_or(planned.y),
-            yaw: (!open_heading).then(|| goal_of(|g| g.yaw).unwrap_or(planned.yaw)),
-            joints,
-        };
+        let given_end = self.mission.path.as_ref().map(|_| end_of(trajectory));
+        let goal = goal(self.mission, self.robot, given_end);
         Task { start, start_joints, goal, clearance: self.mission.clearance }
     }
 
@@ -336,6 +315,19 @@ fn end_of(trajectory: &Trajectory) -> Pose2 {
             let yaw = dy.atan2(dx) + if drive.reverse { std::f64::consts::PI } else { 0.0 };
             Pose2::new(x, y, wrap_angle(yaw))
         }
+    }
+}
+
+/// Where the commands must end: as the mission says, else where its given path does; what neither says is open. (A mission
+/// without a path has a goal position; its reader sees to that.)
+fn goal(mission: &Mission, robot: &RobotModel, given_end: Option<Pose2>) -> Goal {
+    let asked = mission.goal.as_ref();
+    let of = |own: fn(&PoseSpec) -> Option<f64>, end: fn(Pose2) -> f64| asked.and_then(own).or(given_end.map(end));
+    Goal {
+        x: of(|g| g.x, |end| end.x).unwrap_or_default(),
+        y: of(|g| g.y, |end| end.y).unwrap_or_default(),
+        yaw: of(|g| g.yaw, |end| end.yaw),
+        joints: robot.joints.iter().map(|j| asked.and_then(|g| g.joints.get(&j.name).copied())).collect(),
     }
 }
 

@@ -1,12 +1,11 @@
 //! Command files that are there already: judged, measured.
 
-use super::{Inputs, World, end_of, given_path, start_of, world};
-use crate::certify::{self, Certificate, Goal, Task};
+use super::{Inputs, World, end_of, given_path, goal, start_of, world};
+use crate::certify::{self, Certificate, Task};
 use crate::command::CommandTable;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::geom::Pose2;
-use crate::mission::PoseSpec;
-use crate::report::{Metrics, metrics, path_error};
+use crate::report::path_error;
 use crate::retime::{self, RetimeOptions};
 use crate::trajectory::Trajectory;
 
@@ -27,40 +26,24 @@ pub fn check(inputs: &mut Inputs, table: &CommandTable) -> Result<Certificate, D
     let Some(first) = table.rows.first() else {
         return Err(Diagnostic::error("check/empty", "the command file has no row").into());
     };
-    let (start, goal) = match &mission.path {
-        Some(path) => {
-            let trajectory = given_path(mission, path, inputs.path_csv.as_ref(), &robot)?;
-            (Some(start_of(&trajectory)), Some(end_of(&trajectory)))
-        }
-        None => (None, None),
+    let given = match &mission.path {
+        Some(path) => Some(given_path(mission, path, inputs.path_csv.as_ref(), &robot)?),
+        None => None,
     };
-    let asked = |pose: &Option<PoseSpec>, f: fn(&PoseSpec) -> Option<f64>| pose.as_ref().and_then(f);
-    let start_pose = match &start {
-        Some((pose, _)) => *pose,
+    let asked = mission.start.as_ref();
+    let start = match &given {
+        Some(trajectory) => start_of(trajectory).0,
         None => Pose2::new(
-            asked(&mission.start, |p| p.x).unwrap_or(first.pose.x),
-            asked(&mission.start, |p| p.y).unwrap_or(first.pose.y),
-            asked(&mission.start, |p| p.yaw).unwrap_or(first.pose.yaw),
+            asked.and_then(|p| p.x).unwrap_or(first.pose.x),
+            asked.and_then(|p| p.y).unwrap_or(first.pose.y),
+            asked.and_then(|p| p.yaw).unwrap_or(first.pose.yaw),
         ),
     };
-    let joint = |pose: &Option<PoseSpec>, name: &str| pose.as_ref().and_then(|p| p.joints.get(name).copied());
-    let start_joints = robot
-        .joints
-        .iter()
-        .zip(&first.joint_positions)
-        .map(|(j, own)| joint(&mission.start, &j.name).unwrap_or(*own))
-        .collect();
-    let task = Task {
-        start: start_pose,
-        start_joints,
-        goal: Goal {
-            x: asked(&mission.goal, |p| p.x).or(goal.map(|g| g.x)).unwrap_or(first.pose.x),
-            y: asked(&mission.goal, |p| p.y).or(goal.map(|g| g.y)).unwrap_or(first.pose.y),
-            yaw: asked(&mission.goal, |p| p.yaw).or(goal.map(|g| g.yaw)),
-            joints: robot.joints.iter().map(|j| joint(&mission.goal, &j.name)).collect(),
-        },
-        clearance: mission.clearance,
-    };
+    let start_joints = robot.joints.iter().zip(&first.joint_positions);
+    let start_joints =
+        start_joints.map(|(j, own)| asked.and_then(|p| p.joints.get(&j.name).copied()).unwrap_or(*own)).collect();
+    let goal = goal(mission, &robot, given.as_ref().map(end_of));
+    let task = Task { start, start_joints, goal, clearance: mission.clearance };
     Ok(certify::certify(table, &robot, map.as_ref(), &task))
 }
 
@@ -93,9 +76,4 @@ pub fn path_error_of_commands(
 fn planned_poses(table: &CommandTable) -> Trajectory {
     let states = table.rows.iter().map(|row| (row.pose, row.joint_positions.clone())).collect::<Vec<_>>();
     crate::trajectory::through_poses(&states)
-}
-
-/// Length and time of the mission's held commands; for tools.
-pub fn driven(commands: &CommandTable) -> Metrics {
-    metrics::of_commands(commands)
 }

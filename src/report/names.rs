@@ -1,6 +1,6 @@
 //! The words that files use for the choices of a mission. One place, so that readers and writers agree.
 
-use crate::mission::{Sampling, TimeLaw};
+use crate::mission::Sampling;
 use crate::trajectory::{Ending, TrajectorySource};
 
 /// Every sampling and its word.
@@ -19,19 +19,6 @@ pub fn sampling(sampling: Sampling) -> &'static str {
 /// The sampling a word stands for.
 pub fn parse_sampling(word: &str) -> Option<Sampling> {
     SAMPLINGS.iter().find(|(_, name)| *name == word).map(|(value, _)| *value)
-}
-
-/// The word for a time law.
-pub fn time_law(law: TimeLaw) -> &'static str {
-    match law {
-        TimeLaw::Auto => "auto",
-        TimeLaw::Optimal => "optimal",
-        TimeLaw::Wheel => "wheel",
-        TimeLaw::FixedPoint => "fixed_point",
-        TimeLaw::Eq5 => "eq5",
-        TimeLaw::Printed => "printed",
-        TimeLaw::Minco => "minco",
-    }
 }
 
 /// The word for where a trajectory comes from.

@@ -117,16 +117,6 @@ pub fn search(
     }
 }
 
-/// Clearance of one pose and posture: the nearest obstacle within a metre, exactly.
-pub fn contact(map: &VoxelMap, esdf: &Esdf, robot: &RobotModel, pose: Pose2, joints: &[f64]) -> Contact {
-    let grid = PostureGrid::new(robot, joints);
-    if grid.count() <= 64 {
-        Collider::<1>::new(robot, esdf, map, 0.0, grid).contact(pose, joints)
-    } else {
-        Collider::<{ posture::MOST_POSTURES / 64 }>::new(robot, esdf, map, 0.0, grid).contact(pose, joints)
-    }
-}
-
 fn search_postures<const W: usize>(
     map: &VoxelMap,
     esdf: &Esdf,
