@@ -1,5 +1,6 @@
 //! Numeric tools that know no robot, map or configuration.
 
+pub mod banded;
 pub mod block_tridiagonal;
 #[cfg(test)]
 pub(crate) mod fd;

@@ -311,7 +311,7 @@ fn durations(line: &Line<'_>, breaks: &[Break], limits: &Limits) -> Vec<f64> {
 }
 
 /// Time over `length` from speed `a` to speed `b`, never above `cap`, at most with `acceleration`.
-fn trapezoid(a: f64, b: f64, cap: f64, length: f64, acceleration: f64) -> f64 {
+pub(crate) fn trapezoid(a: f64, b: f64, cap: f64, length: f64, acceleration: f64) -> f64 {
     let peak = (acceleration * length + 0.5 * (a * a + b * b)).sqrt().min(cap.max(a).max(b));
     let ramps = (2.0 * peak * peak - a * a - b * b).max(0.0) / (2.0 * acceleration);
     ((peak - a) + (peak - b)) / acceleration + (length - ramps).max(0.0) / peak

@@ -14,6 +14,7 @@ pub mod objective;
 mod options;
 pub mod penalty;
 mod sections;
+pub mod steer;
 #[cfg(test)]
 pub(crate) mod test_robot;
 pub mod time_map;

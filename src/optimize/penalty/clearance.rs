@@ -40,9 +40,20 @@ struct BodyFrame {
     rotation: Matrix3<f64>,
     /// Relative to the base's origin, map axes.
     origin: Vector3<f64>,
+}
+
+/// What pushes on a body.
+#[derive(Debug, Clone, Copy)]
+struct Load {
     force: Vector3<f64>,
     /// About the base's origin.
     torque: Vector3<f64>,
+}
+
+impl Load {
+    fn none() -> Self {
+        Self { force: Vector3::zeros(), torque: Vector3::zeros() }
+    }
 }
 
 /// Where the robot is: position (m), heading as (cos, sin), joint values.
@@ -78,6 +89,9 @@ pub struct ClearancePenalty {
     slack: f64,
     poses: Vec<Isometry3<f64>>,
     frames: Vec<BodyFrame>,
+    loads: Vec<Load>,
+    /// Scratch of [`ClearancePenalty::visit`]: one entry a joint.
+    by_joints: Vec<f64>,
 }
 
 /// Derivatives of the clearance penalty by the pose of the base.
@@ -93,12 +107,7 @@ impl ClearancePenalty {
     /// For `contour` of `robot`, wanting `clearance` m in a field with cells of `cell` m; violations count in units of `scale` m.
     pub fn new(contour: Contour, robot: &RobotModel, clearance: f64, scale: f64, cell: f64) -> Self {
         let bodies = robot.bodies.len();
-        let frame = BodyFrame {
-            rotation: Matrix3::identity(),
-            origin: Vector3::zeros(),
-            force: Vector3::zeros(),
-            torque: Vector3::zeros(),
-        };
+        let frame = BodyFrame { rotation: Matrix3::identity(), origin: Vector3::zeros() };
         Self {
             reaches: contour.shapes.iter().map(|shape| Reach::of(robot, shape)).collect(),
             memory: Vec::new(),
@@ -110,6 +119,8 @@ impl ClearancePenalty {
             slack: INTERPOLATION_SLACK * cell,
             poses: Vec::with_capacity(bodies),
             frames: vec![frame; bodies],
+            loads: vec![Load::none(); bodies],
+            by_joints: vec![0.0; robot.joints.len()],
         }
     }
 
@@ -135,8 +146,6 @@ impl ClearancePenalty {
         for (frame, pose) in self.frames.iter_mut().zip(&self.poses) {
             frame.rotation = turn * pose.rotation.to_rotation_matrix().into_inner();
             frame.origin = turn * pose.translation.vector;
-            frame.force = Vector3::zeros();
-            frame.torque = Vector3::zeros();
         }
     }
 
@@ -185,18 +194,97 @@ impl ClearancePenalty {
             return 0.0;
         }
         self.place(robot, at.heading, at.joints);
+        self.loads.fill(Load::none());
+        let (scale, mut sum, mut touched) = (self.scale, 0.0, false);
+        let mut loads = std::mem::take(&mut self.loads);
+        self.scan(field, at.position, sample, |body, arm, short, gradient| {
+            let (cost, slope) = judge.weigh(short / scale);
+            sum += cost;
+            if slope != 0.0 {
+                let push = gradient * (-slope / scale);
+                loads[body].force += push;
+                loads[body].torque += arm.cross(&push);
+                touched = true;
+            }
+        });
+        self.loads = loads;
+        if touched {
+            self.gather(robot, by_pose, by_joints);
+        }
+        sum
+    }
+
+    /// Tells `touch` of every contour point that misses the wanted clearance at a place that is a step of `sample` away from where
+    /// it was last: by how much (m, above 0), and that amount's derivatives by x, y, heading and joints.
+    pub(crate) fn visit(
+        &mut self,
+        robot: &RobotModel,
+        field: &impl DistanceField,
+        at: Placement<'_>,
+        sample: usize,
+        mut touch: impl FnMut(f64, &ByPose, &[f64]),
+    ) {
+        if !self.moved(at, sample) {
+            return;
+        }
+        self.place(robot, at.heading, at.joints);
+        let mut by_joints = std::mem::take(&mut self.by_joints);
+        let frames = std::mem::take(&mut self.frames);
+        self.scan_in(&frames, field, at.position, sample, |body, arm, short, gradient| {
+            if short <= 0.0 {
+                return;
+            }
+            let push = -gradient;
+            by_joints.fill(0.0);
+            let mut link = body;
+            while link != 0 {
+                let (frame, moves) = (&frames[link], &robot.bodies[link]);
+                if let Some(motion) = &moves.motion {
+                    let axis = frame.rotation * motion.axis.into_inner();
+                    let felt =
+                        if motion.prismatic { axis.dot(&push) } else { axis.dot(&(arm - frame.origin).cross(&push)) };
+                    by_joints[motion.joint] += motion.multiplier * felt;
+                }
+                link = moves.parent;
+            }
+            let by_pose = ByPose { position: [push.x, push.y], heading: arm.x * push.y - arm.y * push.x };
+            touch(short, &by_pose, &by_joints);
+        });
+        self.frames = frames;
+        self.by_joints = by_joints;
+    }
+
+    fn scan(
+        &mut self,
+        field: &impl DistanceField,
+        position: [f64; 2],
+        sample: usize,
+        point: impl FnMut(usize, Vector3<f64>, f64, Vector3<f64>),
+    ) {
+        let frames = std::mem::take(&mut self.frames);
+        self.scan_in(&frames, field, position, sample, point);
+        self.frames = frames;
+    }
+
+    /// Looks at every point that may miss the clearance: its body, where it is from the base's origin (map axes), by how much it
+    /// misses (m), and the field's gradient there. Notes how far each shape may move before that has to be done again.
+    fn scan_in(
+        &mut self,
+        frames: &[BodyFrame],
+        field: &impl DistanceField,
+        position: [f64; 2],
+        sample: usize,
+        mut look: impl FnMut(usize, Vector3<f64>, f64, Vector3<f64>),
+    ) {
         let stride = self.stride();
         let free = &mut self.memory[sample * stride + 4 + self.joints..(sample + 1) * stride];
-        let base = Vector3::new(at.position[0], at.position[1], 0.0);
-        let mut sum = 0.0;
-        let mut touched = false;
+        let base = Vector3::new(position[0], position[1], 0.0);
         for (shape, free) in self.contour.shapes.iter().zip(free) {
             if *free > 0.0 {
                 continue;
             }
-            let frame = &mut self.frames[shape.body];
+            let frame = &frames[shape.body];
             let placed = |p: &Point3<f64>| frame.rotation * p.coords + frame.origin;
-            let (mut force, mut torque) = (Vector3::zeros(), Vector3::zeros());
             let mut node = 0;
             *free = f64::INFINITY;
             while let Some(patch) = shape.patches.get(node) {
@@ -217,43 +305,30 @@ impl ClearancePenalty {
                     let (distance, gradient) = field.distance_gradient((arm + base).into());
                     let short = self.clearance + point.radius - distance;
                     *free = free.min(-short / INTERPOLATION_SLOPE);
-                    let (cost, slope) = judge.weigh(short / self.scale);
-                    sum += cost;
-                    if slope != 0.0 {
-                        let push = Vector3::from(gradient) * (-slope / self.scale);
-                        force += push;
-                        torque += arm.cross(&push);
-                        touched = true;
-                    }
+                    look(shape.body, arm, short, Vector3::from(gradient));
                 }
             }
-            frame.force += force;
-            frame.torque += torque;
         }
-        if touched {
-            self.gather(robot, by_pose, by_joints);
-        }
-        sum
     }
 
     /// Hands forces down to the base; a body comes after its parent.
     fn gather(&mut self, robot: &RobotModel, by_pose: &mut ByPose, by_joints: &mut [f64]) {
         for (index, body) in robot.bodies.iter().enumerate().skip(1).rev() {
-            let frame = self.frames[index];
+            let (frame, load) = (self.frames[index], self.loads[index]);
             if let Some(motion) = &body.motion {
                 let axis = frame.rotation * motion.axis.into_inner();
                 let felt = if motion.prismatic {
-                    axis.dot(&frame.force)
+                    axis.dot(&load.force)
                 } else {
-                    axis.dot(&(frame.torque - frame.origin.cross(&frame.force)))
+                    axis.dot(&(load.torque - frame.origin.cross(&load.force)))
                 };
                 by_joints[motion.joint] += motion.multiplier * felt;
             }
-            let parent = &mut self.frames[body.parent];
-            parent.force += frame.force;
-            parent.torque += frame.torque;
+            let parent = &mut self.loads[body.parent];
+            parent.force += load.force;
+            parent.torque += load.torque;
         }
-        let base = &self.frames[0];
+        let base = &self.loads[0];
         by_pose.position[0] += base.force.x;
         by_pose.position[1] += base.force.y;
         by_pose.heading += base.torque.z;
