@@ -35,9 +35,16 @@ impl AlphaExcess {
     pub fn of_trajectory(trajectory: &Trajectory, limit: f64, time: f64) -> Self {
         let (mut peak, mut above) = (0.0f64, 0.0);
         for leg in &trajectory.legs {
-            let Leg::Drive(drive) = leg else { continue };
-            for piece in &drive.curve.pieces {
+            let pieces = match leg {
+                Leg::Drive(drive) => &drive.curve.pieces,
+                Leg::Steer(steer) => &steer.curve.pieces,
+                Leg::Still(_) => continue,
+            };
+            for piece in pieces {
                 let ratio = |u: f64| {
+                    if let Leg::Steer(_) = leg {
+                        return piece.derivative(0, 2, u).abs() / limit;
+                    }
                     let of = |order| [piece.derivative(0, order, u), piece.derivative(1, order, u)];
                     base_motion(of(1), of(2), of(3)).alpha.abs() / limit
                 };

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::fields::{MISSION, PATH, POSE, SAMPLING_LAWS, TIME_LAWS};
+use super::fields::{MISSION, PARAMETERISATIONS, PATH, POSE, SAMPLING_LAWS, TIME_LAWS};
 use super::{MapSpec, Mission, MissionSpans, NamedJoint, PathSpec, PoseSpec, Sampling, TimeLaw, Unknown, limits};
 use crate::diag::shape::Field;
 use crate::diag::yaml::{Entry, Node};
@@ -41,6 +41,7 @@ pub(super) fn parse(name: &str, text: &str) -> Result<Mission, Diagnostics> {
         sampling: pick(&SAMPLING_LAWS, word("sampling")).unwrap_or(Sampling::Mean),
         time_law: pick(&TIME_LAWS, word("time_law")).unwrap_or(TimeLaw::Auto),
         reverse: root.get("reverse").and_then(Node::flag).unwrap_or(false),
+        parameterisation: pick(&PARAMETERISATIONS, word("parameterisation")).unwrap_or_default(),
         path_error_times: path_error_times(&root),
         limits: limits::read(root.get("limits")),
         spans: spans(&source, &root),

@@ -6,7 +6,7 @@ use crate::mission::Sampling;
 use crate::retime::MotionProfile;
 use crate::retime::course::Course;
 use crate::robot::RobotModel;
-use crate::trajectory::plane_curve::{Place, PlaneCurve};
+use crate::trajectory::plane_curve::Place;
 
 /// Distance between points of the replay that are measured, and between vertices of the reference, m.
 const STEP: f64 = 1e-3;
@@ -126,6 +126,14 @@ impl PathReference {
                         add(curved.curve.point(place), place);
                     }
                 }
+                Course::Steered(steered) => {
+                    let steps = (steered.curve.length() / STEP).ceil().max(1.0);
+                    for i in 0..=steps as usize {
+                        let place = steered.curve.place_at_travelled(steered.curve.length() * i as f64 / steps);
+                        let pose = steered.pose(place);
+                        add([pose.x, pose.y], place);
+                    }
+                }
                 Course::Proportional(p) => {
                     let steps = (p.drive.abs() / STEP).ceil().max(1.0);
                     for i in 0..=steps as usize {
@@ -203,14 +211,20 @@ impl PathReference {
         let near = square(vertex.point, point).sqrt();
         match &self.courses[vertex.course as usize] {
             Course::Curved(curved) => {
-                let parameter = |k: usize| {
-                    let other = self.vertices.get(k).filter(|v| v.course == vertex.course);
-                    other.map(|v| curved.curve.parameter(v.place))
+                let bracket = self.bracket(nearest, |place| curved.curve.parameter(place));
+                let jets = |u: f64| {
+                    let place = curved.curve.place(u);
+                    [0, 1].map(|d| {
+                        let [value, first, second, _] = curved.curve.jet(d, place);
+                        [value, first, second]
+                    })
                 };
-                let own = curved.curve.parameter(vertex.place);
-                let low = nearest.checked_sub(1).and_then(parameter).unwrap_or(own);
-                let high = parameter(nearest + 1).unwrap_or(own);
-                near.min(distance_to_curve(&curved.curve, [low, own, high], point))
+                near.min(distance_to_curve(jets, bracket, point))
+            }
+            Course::Steered(steered) => {
+                let bracket = self.bracket(nearest, |place| steered.curve.parameter(place));
+                let jets = |u: f64| steered.curve.point_jet(steered.curve.place(u));
+                near.min(distance_to_curve(jets, bracket, point))
             }
             Course::Proportional(p) if p.drive != 0.0 => {
                 let (sin, cos) = p.pose.yaw.sin_cos();
@@ -221,6 +235,14 @@ impl PathReference {
             }
             Course::Proportional(_) => near,
         }
+    }
+
+    /// Parameters of the vertices before, at and after one, as far as they are on its course.
+    fn bracket(&self, vertex: usize, parameter: impl Fn(Place) -> f64) -> [f64; 3] {
+        let course = self.vertices[vertex].course;
+        let of = |k: usize| self.vertices.get(k).filter(|v| v.course == course).map(|v| parameter(v.place));
+        let own = parameter(self.vertices[vertex].place);
+        [vertex.checked_sub(1).and_then(of).unwrap_or(own), own, of(vertex + 1).unwrap_or(own)]
     }
 
     /// The vertex nearest to a point: rings of cells about it, until no nearer one can follow.
@@ -261,11 +283,15 @@ impl PathReference {
 
 /// Distance from a point to the part of a curve between two parameters, from a first guess between them: Newton's steps on the
 /// foot's condition, halving the bracket where a step leaves it (at rest and near it the parameter is far from arc length).
-fn distance_to_curve(curve: &PlaneCurve, [mut low, mut u, mut high]: [f64; 3], point: [f64; 2]) -> f64 {
+/// `jets`: x and y with two derivatives by the parameter.
+fn distance_to_curve(
+    jets: impl Fn(f64) -> [[f64; 3]; 2],
+    [mut low, mut u, mut high]: [f64; 3],
+    point: [f64; 2],
+) -> f64 {
     let mut best = f64::INFINITY;
     for _ in 0..40 {
-        let at = curve.place(u);
-        let (x, y) = (curve.jet(0, at), curve.jet(1, at));
+        let [x, y] = jets(u);
         let offset = [x[0] - point[0], y[0] - point[1]];
         best = best.min(offset[0].hypot(offset[1]));
         let slope = offset[0] * x[1] + offset[1] * y[1];

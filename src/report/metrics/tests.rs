@@ -4,7 +4,7 @@ use crate::geom::Pose2;
 use crate::math::poly::PiecewisePoly;
 use crate::mission::Sampling;
 use crate::robot::{BaseLimits, MotionLimits, MovingJoint};
-use crate::trajectory::TrajectorySource;
+use crate::trajectory::{DriveLeg, TrajectorySource};
 
 fn robot() -> RobotModel {
     let limits =
