@@ -175,6 +175,15 @@ impl Parameterisation {
     /// What a mission gets that names none.
     pub const DEFAULT: Self = Self::Flat;
 
+    /// What a mission gets that names a law, but no parameterisation: laws of the distance driven have nothing to say where the base
+    /// stands, as it may within the legs of [`Self::ArcLength`].
+    pub fn suiting(law: TimeLaw) -> Self {
+        match law {
+            TimeLaw::Eq5 | TimeLaw::FixedPoint | TimeLaw::Printed => Self::Flat,
+            TimeLaw::Auto | TimeLaw::Optimal | TimeLaw::Wheel | TimeLaw::Minco => Self::DEFAULT,
+        }
+    }
+
     /// Its word in missions, reports and options.
     pub fn key(self) -> &'static str {
         match self {

@@ -127,12 +127,21 @@ impl PathReference {
                     }
                 }
                 Course::Steered(steered) => {
-                    let steps = (steered.curve.length() / STEP).ceil().max(1.0);
-                    for i in 0..=steps as usize {
-                        let place = steered.curve.place_at_travelled(steered.curve.length() * i as f64 / steps);
+                    // Every node is a vertex: corners and cusps lie between no two of them.
+                    let nodes: Vec<Place> = steered.curve.nodes().collect();
+                    let mut add_at = |place| {
                         let pose = steered.pose(place);
                         add([pose.x, pose.y], place);
+                    };
+                    for pair in nodes.windows(2) {
+                        let [from, to] = [pair[0], pair[1]].map(|place| steered.curve.travelled(place));
+                        let steps = ((to - from) / STEP).ceil().max(1.0);
+                        add_at(pair[0]);
+                        for i in 1..steps as usize {
+                            add_at(steered.curve.place_at_travelled(from + (to - from) * i as f64 / steps));
+                        }
                     }
+                    add_at(steered.curve.end());
                 }
                 Course::Proportional(p) => {
                     let steps = (p.drive.abs() / STEP).ceil().max(1.0);
@@ -222,9 +231,11 @@ impl PathReference {
                 near.min(distance_to_curve(jets, bracket, point))
             }
             Course::Steered(steered) => {
-                let bracket = self.bracket(nearest, |place| steered.curve.parameter(place));
+                let [low, own, high] = self.bracket(nearest, |place| steered.curve.parameter(place));
                 let jets = |u: f64| steered.curve.point_jet(steered.curve.place(u));
-                near.min(distance_to_curve(jets, bracket, point))
+                // The vertex may be a corner, so each side is a curve of its own.
+                let side = |from: f64, to: f64| distance_to_curve(jets, [from, 0.5 * (from + to), to], point);
+                near.min(side(low, own)).min(side(own, high))
             }
             Course::Proportional(p) if p.drive != 0.0 => {
                 let (sin, cos) = p.pose.yaw.sin_cos();
