@@ -14,7 +14,7 @@ use crate::diag::{Diagnostic, Diagnostics};
 use crate::esdf;
 use crate::geom::{Pose2, wrap_angle};
 use crate::map::VoxelMap;
-use crate::mission::{Mission, PathSpec, PoseSpec};
+use crate::mission::{Mission, Parameterisation, PathSpec, PoseSpec};
 use crate::optimize::{self, OptimizeOptions};
 use crate::report::schema::{InitialPart, ProfilePart, SearchPart, TrajectoryPart};
 use crate::report::schema::{InputFile, InputsPart};
@@ -22,7 +22,7 @@ use crate::report::{Report, metrics, path_error};
 use crate::retime::{self, MotionProfile, RetimeOptions};
 use crate::robot::{Files, RobotModel, spec::RobotSpec};
 use crate::search::{self, Query, SearchError, SearchOptions};
-use crate::trajectory::{Leg, Trajectory, TrajectorySource, given};
+use crate::trajectory::{Leg, Trajectory, TrajectorySource, given, steered_curve::SteeredCurve};
 
 /// A text file that was read.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -69,13 +69,15 @@ pub struct Inputs {
 pub struct CompileOptions {
     /// Instead of the mission's, s.
     pub sampling_time: Option<f64>,
+    /// Instead of the mission's.
+    pub parameterisation: Option<Parameterisation>,
     /// Dense sampling in the optimiser (\[SCR\] section IV-C). Default true.
     pub dense: bool,
 }
 
 impl Default for CompileOptions {
     fn default() -> Self {
-        Self { sampling_time: None, dense: true }
+        Self { sampling_time: None, parameterisation: None, dense: true }
     }
 }
 
@@ -184,7 +186,7 @@ fn stages(
     let finish = Finish { mission, robot, map: map.as_ref(), sampling_time };
     let made = match (given, map) {
         (Some(trajectory), _) => finish.certify(run, trajectory)?,
-        (None, Some(map)) => plan(run, &finish, map, options.dense)?,
+        (None, Some(map)) => plan(run, &finish, map, options)?,
         (None, None) => {
             let message = "the mission has neither a map nor a path of its own";
             return Err(Diagnostic::error("mission/no-map", message).into());
@@ -218,7 +220,9 @@ struct Made {
 }
 
 /// Searches and optimises until something is certified; the search's own path is the last try.
-fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, dense: bool) -> Result<Made, Diagnostics> {
+fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, options: &CompileOptions) -> Result<Made, Diagnostics> {
+    let parameterisation = options.parameterisation.unwrap_or(finish.mission.parameterisation);
+    let dense = options.dense;
     let (mission, robot) = (finish.mission, finish.robot);
     let field = run.stage("esdf", || esdf::build(map));
     let query = query(mission, robot);
@@ -237,7 +241,8 @@ fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, dense: bool) -> 
         return finish.certify(run, path.trajectory());
     }
     for margin in OPTIMISER_MARGINS {
-        let options = OptimizeOptions { clearance: mission.clearance + margin, dense, ..Default::default() };
+        let clearance = mission.clearance + margin;
+        let options = OptimizeOptions { parameterisation, clearance, dense, ..Default::default() };
         let trajectory = run.stage("optimize", || optimize::optimize(&path, &field, robot, &options));
         // A trajectory that no law can time is one more reason to go on to the next try.
         if let Some(made) = finish.certify(run, trajectory).ok().filter(|made| made.certificate.holds()) {
@@ -301,6 +306,10 @@ fn start_of(trajectory: &Trajectory) -> (Pose2, Vec<f64>) {
             let dims = drive.curve.pieces[0].coefficients.len();
             (Pose2::new(value(0), value(1), drive.yaw_start), (2..dims).map(value).collect())
         }
+        Leg::Steer(steer) => {
+            let dims = steer.curve.pieces[0].coefficients.len();
+            (steer.pose, (2..dims).map(|d| steer.curve.derivative(d, 0, 0.0)).collect())
+        }
     }
 }
 
@@ -315,6 +324,8 @@ fn end_of(trajectory: &Trajectory) -> Pose2 {
             let yaw = dy.atan2(dx) + if drive.reverse { std::f64::consts::PI } else { 0.0 };
             Pose2::new(x, y, wrap_angle(yaw))
         }
+        // Only planned motions have such legs, and those that cannot be tabulated have been refused.
+        Leg::Steer(steer) => SteeredCurve::new(steer).map_or(steer.pose, |curve| curve.end_pose()),
     }
 }
 

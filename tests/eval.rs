@@ -102,6 +102,23 @@ fn a_suite_of_three_scenes_is_written_read_back_and_judged_alike() {
 }
 
 #[test]
+fn a_parameterisation_is_taken_for_all_scenes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("s.json"), SCENES).expect("written");
+    for parameterisation in ["flat", "arc_length"] {
+        let args = ["--scenes", "s.json", "--robot", ROBOT, "--write-commands", parameterisation, "--parameterisation"];
+        let args: Vec<&str> = args.into_iter().chain([parameterisation]).collect();
+        let output = eval(&args, folder.path());
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        for id in ["ahead", "around"] {
+            let path = folder.path().join(parameterisation).join(id).join("report.json");
+            let report: Value = serde_json::from_str(&std::fs::read_to_string(path).expect("beside")).expect("JSON");
+            assert_eq!(report["trajectory"]["parameterisation"], parameterisation);
+        }
+    }
+}
+
+#[test]
 fn bad_input_ends_with_two_and_says_what_to_do() {
     let folder = tempfile::tempdir().expect("a folder");
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("written");
@@ -114,6 +131,7 @@ fn bad_input_ends_with_two_and_says_what_to_do() {
     let table: &[(&[&str], &str)] = &[
         (&[], "--suite"),
         (&["--suite", "table4"], "table3"),
+        (&["--suite", "table1", "--parameterisation", "arclength"], "arc_length"),
         (&["--suite", "table1", "--scenes", "good.json"], "cannot be used with"),
         (&["--suite", "table1", "--boxes", "10"], "`--boxes` is for table3"),
         (&["--suite", "table3", "--boxes", "0"], "1..=60"),

@@ -106,6 +106,7 @@ fn wrong_values() {
     mission("not_finite", &with("clearance_m: .nan"));
     mission("too_large_number", &with("start: {x_m: 1e400, y_m: 0.5, yaw: 0}"));
     mission("negative_clearance", &with("clearance_m: -0.05"));
+    mission("parameterisation", &with("parameterisation: arc length"));
     mission("sampling_time", &with("sampling_time_s: 0"));
     mission("sampling_time_long", &with("sampling_time_s: 100"));
     mission("resolution", &with("map: {file: a.pcd, resolution_m: 0}"));

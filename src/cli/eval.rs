@@ -11,6 +11,7 @@ use super::terminal::Terminal;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::emit::csv::{self, CsvHeader};
 use crate::eval::{self, Judged, SceneSet, Suite, figures, tables};
+use crate::mission::Parameterisation;
 use crate::pipeline::{CompileOptions, Outcome, TextFile};
 use crate::report::schema::{InputFile, InputsPart};
 use crate::robot::{self, Files, RobotInputs, RobotModel, spec};
@@ -41,6 +42,9 @@ pub struct EvalArgs {
     #[arg(long, value_name = "N", value_delimiter = ',', conflicts_with = "scenes",
           value_parser = clap::value_parser!(u16).range(1..=60))]
     boxes: Vec<u16>,
+    /// What the optimiser's polynomials are of [default: as in a mission that does not say].
+    #[arg(long, value_name = "WHAT")]
+    parameterisation: Option<Parameterisation>,
     /// Also write the suite's scenes to a file.
     #[arg(long, value_name = "FILE.json", conflicts_with = "scenes")]
     write_scenes: Option<PathBuf>,
@@ -78,7 +82,7 @@ pub fn eval(args: &EvalArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics>
     let runs = if suite == Some(Suite::Table2) { 2 } else { 1 };
     let bar = progress(terminal, runs * set.scenes.len());
     let run = |dense: bool, writer: Option<&Writer<'_>>| -> Result<Vec<Judged>, Diagnostics> {
-        let options = CompileOptions { dense, ..CompileOptions::default() };
+        let options = CompileOptions { dense, parameterisation: args.parameterisation, ..Default::default() };
         let judge = |scene| {
             let (judged, outcome) = eval::judge(&set, scene, &loaded.robot, &options)?;
             if let Some(writer) = writer {

@@ -35,9 +35,16 @@ impl AlphaExcess {
     pub fn of_trajectory(trajectory: &Trajectory, limit: f64, time: f64) -> Self {
         let (mut peak, mut above) = (0.0f64, 0.0);
         for leg in &trajectory.legs {
-            let Leg::Drive(drive) = leg else { continue };
-            for piece in &drive.curve.pieces {
+            let pieces = match leg {
+                Leg::Drive(drive) => &drive.curve.pieces,
+                Leg::Steer(steer) => &steer.curve.pieces,
+                Leg::Still(_) => continue,
+            };
+            for piece in pieces {
                 let ratio = |u: f64| {
+                    if let Leg::Steer(_) = leg {
+                        return piece.derivative(0, 2, u).abs() / limit;
+                    }
                     let of = |order| [piece.derivative(0, order, u), piece.derivative(1, order, u)];
                     base_motion(of(1), of(2), of(3)).alpha.abs() / limit
                 };
@@ -61,7 +68,7 @@ mod tests {
     use crate::geom::Pose2;
     use crate::math::poly::{Piece, PiecewisePoly};
     use crate::mission::Sampling;
-    use crate::trajectory::{DriveLeg, TrajectorySource};
+    use crate::trajectory::{DriveLeg, SteerLeg, TrajectorySource};
 
     #[test]
     fn held_turn_rates_count_their_steps_from_and_to_rest() {
@@ -95,5 +102,16 @@ mod tests {
         let trajectory = Trajectory { legs: vec![leg], source: TrajectorySource::Optimised, optimiser: None };
         let excess = AlphaExcess::of_trajectory(&trajectory, 2e-3, 4.0);
         assert!((excess.peak - 1.5).abs() < 1e-4 && (excess.share - 0.25).abs() < 1e-9, "{excess:?}");
+    }
+
+    #[test]
+    fn a_leg_of_heading_and_arc_length_counts_the_second_derivative_of_its_heading() {
+        // Heading t^3/6 a second long: alpha = t, in a spin as in a drive.
+        let piece = |s: f64| Piece { duration: 1.0, coefficients: vec![vec![0.0, 0.0, 0.0, 1.0 / 6.0], vec![0.0, s]] };
+        let curve = PiecewisePoly { pieces: vec![piece(0.0), piece(-0.5)] };
+        let leg = Leg::Steer(SteerLeg { pose: Pose2::default(), curve });
+        let trajectory = Trajectory { legs: vec![leg], source: TrajectorySource::Optimised, optimiser: None };
+        let excess = AlphaExcess::of_trajectory(&trajectory, 0.8, 2.0);
+        assert!((excess.peak - 1.25).abs() < 1e-12 && (excess.share - 0.2).abs() < 1e-9, "{excess:?}");
     }
 }

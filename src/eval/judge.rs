@@ -12,7 +12,7 @@ use crate::report::metrics;
 use crate::report::schema::Failure;
 use crate::report::{Metrics, Status};
 use crate::robot::RobotModel;
-use crate::trajectory::{Leg, Trajectory};
+use crate::trajectory::{Leg, Trajectory, steered_curve::SteeredCurve};
 
 /// What became of a scene.
 #[derive(Debug, Clone, PartialEq)]
@@ -120,9 +120,14 @@ pub fn judge(
     Ok((judged, outcome))
 }
 
-/// Drives and turns on the spot.
+/// Drives and turns on the spot. A leg of heading and arc length counts as one drive, whatever turns on the spot are in it.
 fn legs(trajectory: &Trajectory) -> [usize; 2] {
-    let drives = trajectory.legs.iter().filter(|l| matches!(l, Leg::Drive(_))).count();
+    let drives = |leg: &&Leg| match leg {
+        Leg::Drive(_) => true,
+        Leg::Steer(steer) => SteeredCurve::new(steer).is_ok_and(|curve| curve.length() > 0.0),
+        Leg::Still(_) => false,
+    };
+    let drives = trajectory.legs.iter().filter(drives).count();
     [drives, trajectory.legs.len() - drives]
 }
 

@@ -6,7 +6,7 @@ use super::fault::ScenesError;
 use crate::diag::Diagnostics;
 use crate::geom::Aabb;
 use crate::map::VoxelMap;
-use crate::mission::{LimitsSpec, Mission, PoseSpec, Sampling, TimeLaw, Unknown};
+use crate::mission::{LimitsSpec, Mission, Parameterisation, PoseSpec, Sampling, TimeLaw, Unknown};
 use crate::robot::RobotModel;
 
 /// The value of `schema`.
@@ -63,6 +63,7 @@ impl SceneSet {
             sampling: Sampling::Mean,
             time_law: TimeLaw::Auto,
             reverse: self.reverse,
+            parameterisation: Parameterisation::DEFAULT,
             path_error_times: Vec::new(),
             limits: self.limits.clone(),
             source: Default::default(),

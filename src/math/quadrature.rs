@@ -16,6 +16,17 @@ pub fn gauss_legendre(from: f64, to: f64, mut f: impl FnMut(f64) -> f64) -> f64 
     half * NODES.iter().rev().map(|(x, w)| w * (f(middle - half * x) + f(middle + half * x))).sum::<f64>()
 }
 
+/// [`gauss_legendre`] of two functions that are evaluated together.
+pub fn gauss_legendre_2(from: f64, to: f64, mut f: impl FnMut(f64) -> [f64; 2]) -> [f64; 2] {
+    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+    let mut sum = [0.0; 2];
+    for (x, w) in NODES.iter().rev() {
+        let (low, high) = (f(middle - half * x), f(middle + half * x));
+        (0..2).for_each(|k| sum[k] += w * (low[k] + high[k]));
+    }
+    sum.map(|sum| half * sum)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -35,5 +46,11 @@ mod tests {
         let forth = gauss_legendre(0.0, 2.0, f64::exp);
         assert!((forth - (2f64.exp() - 1.0)).abs() < 1e-14);
         assert_eq!(forth, -gauss_legendre(2.0, 0.0, f64::exp));
+    }
+
+    #[test]
+    fn two_functions_together_are_those_functions() {
+        let both = gauss_legendre_2(0.3, 1.9, |x| [x.cos(), x.exp()]);
+        assert_eq!(both, [gauss_legendre(0.3, 1.9, f64::cos), gauss_legendre(0.3, 1.9, f64::exp)]);
     }
 }

@@ -1,6 +1,6 @@
 //! The keys of a mission file.
 
-use super::{Sampling, TimeLaw};
+use super::{Parameterisation, Sampling, TimeLaw};
 use crate::diag::shape::{Bounds, Choice, Field, LARGE, Shape};
 
 const METRES: Shape = Shape::Number(Bounds::any("m"));
@@ -8,7 +8,7 @@ const METRES: Shape = Shape::Number(Bounds::any("m"));
 const SAMPLING_TIME: Shape = Shape::Number(Bounds::between(1e-4, 10.0, "s"));
 
 /// The keys of a mission file.
-pub(super) static MISSION: [Field; 13] = [
+pub(super) static MISSION: [Field; 14] = [
     Field::required(
         "robot",
         Shape::Text,
@@ -66,6 +66,19 @@ pub(super) static MISSION: [Field; 13] = [
         "how the path is timed; default auto: the fastest that keeps every limit",
     ),
     Field::optional("reverse", Shape::Flag, "true", "whether the robot may drive backwards; default false"),
+    Field::optional(
+        "parameterisation",
+        Shape::Choice(&PARAMETERISATION),
+        "arc_length",
+        match Parameterisation::DEFAULT {
+            Parameterisation::Flat => {
+                "what is planned as polynomials in time: positions (flat, default), or heading and arc length"
+            }
+            Parameterisation::ArcLength => {
+                "what is planned as polynomials in time: positions (flat), or heading and arc length (arc_length, default)"
+            }
+        },
+    ),
     Field::optional(
         "path_error",
         Shape::Table(&PATH_ERROR),
@@ -152,6 +165,8 @@ static TIME_LAW: [Choice; 7] = [
     Choice::now("minco"),
 ];
 
+static PARAMETERISATION: [Choice; 2] = [Choice::now("flat"), Choice::now("arc_length")];
+
 static PATH_ERROR: [Field; 1] = [Field::required(
     "sampling_times_s",
     Shape::List { item: &SAMPLING_TIME, count: (1, 100), form: "a list of 1 to 100 sampling times in seconds" },
@@ -191,3 +206,7 @@ pub(super) static TIME_LAWS: [(&str, TimeLaw); 7] = [
     ("printed", TimeLaw::Printed),
     ("minco", TimeLaw::Minco),
 ];
+
+/// What the words of `parameterisation` stand for.
+pub(super) static PARAMETERISATIONS: [(&str, Parameterisation); 2] =
+    [("flat", Parameterisation::Flat), ("arc_length", Parameterisation::ArcLength)];

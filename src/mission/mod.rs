@@ -35,6 +35,8 @@ pub struct Mission {
     pub time_law: TimeLaw,
     /// Whether the search may drive backwards.
     pub reverse: bool,
+    /// What the optimiser's polynomials are of.
+    pub parameterisation: Parameterisation,
     /// Sampling times of the path-error report, seconds, ascending.
     pub path_error_times: Vec<f64>,
     /// Overrides of the robot's limits.
@@ -157,6 +159,44 @@ pub enum TimeLaw {
     Printed,
     /// The optimiser's own timing.
     Minco,
+}
+
+/// What the optimiser's polynomials in time are of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[value(rename_all = "snake_case")]
+pub enum Parameterisation {
+    /// Positions (x, y), \[SCR\] section III: the flat output of the base. Stops where it must turn on the spot.
+    Flat,
+    /// Heading and arc length, `MATH` section 10: turns on the spot and changes of direction are part of the motion.
+    ArcLength,
+}
+
+impl Parameterisation {
+    /// What a mission gets that names none.
+    pub const DEFAULT: Self = Self::Flat;
+
+    /// What a mission gets that names a law, but no parameterisation: laws of the distance driven have nothing to say where the base
+    /// stands, as it may within the legs of [`Self::ArcLength`].
+    pub fn suiting(law: TimeLaw) -> Self {
+        match law {
+            TimeLaw::Eq5 | TimeLaw::FixedPoint | TimeLaw::Printed => Self::Flat,
+            TimeLaw::Auto | TimeLaw::Optimal | TimeLaw::Wheel | TimeLaw::Minco => Self::DEFAULT,
+        }
+    }
+
+    /// Its word in missions, reports and options.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Flat => "flat",
+            Self::ArcLength => "arc_length",
+        }
+    }
+}
+
+impl Default for Parameterisation {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
 }
 
 /// Limits by part, each key optional; the mission's win over robot.yaml's, key by key. SI units.

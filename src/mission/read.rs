@@ -3,8 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::fields::{MISSION, PATH, POSE, SAMPLING_LAWS, TIME_LAWS};
-use super::{MapSpec, Mission, MissionSpans, NamedJoint, PathSpec, PoseSpec, Sampling, TimeLaw, Unknown, limits};
+use super::fields::{MISSION, PARAMETERISATIONS, PATH, POSE, SAMPLING_LAWS, TIME_LAWS};
+use super::{
+    MapSpec, Mission, MissionSpans, NamedJoint, Parameterisation, PathSpec, PoseSpec, Sampling, TimeLaw, Unknown,
+    limits,
+};
 use crate::diag::shape::Field;
 use crate::diag::yaml::{Entry, Node};
 use crate::diag::{Diagnostic, Diagnostics, Source, Span, shape, yaml};
@@ -29,6 +32,7 @@ pub(super) fn parse(name: &str, text: &str) -> Result<Mission, Diagnostics> {
     let number = |key: &str, default: f64| root.get(key).and_then(Node::number).unwrap_or(default);
     let stem = Path::new(name).file_stem().map(|s| s.to_string_lossy().into_owned());
     let word = |key: &str| root.get(key).and_then(Node::text);
+    let time_law = pick(&TIME_LAWS, word("time_law")).unwrap_or(TimeLaw::Auto);
     Ok(Mission {
         name: stem.unwrap_or_else(|| "mission".into()),
         robot: path(root.get("robot")).unwrap_or_default(),
@@ -39,8 +43,10 @@ pub(super) fn parse(name: &str, text: &str) -> Result<Mission, Diagnostics> {
         clearance: number("clearance_m", 0.05),
         sampling_time: number("sampling_time_s", 0.1),
         sampling: pick(&SAMPLING_LAWS, word("sampling")).unwrap_or(Sampling::Mean),
-        time_law: pick(&TIME_LAWS, word("time_law")).unwrap_or(TimeLaw::Auto),
+        time_law,
         reverse: root.get("reverse").and_then(Node::flag).unwrap_or(false),
+        parameterisation: pick(&PARAMETERISATIONS, word("parameterisation"))
+            .unwrap_or_else(|| Parameterisation::suiting(time_law)),
         path_error_times: path_error_times(&root),
         limits: limits::read(root.get("limits")),
         spans: spans(&source, &root),

@@ -22,6 +22,7 @@ sampling_time_s: 0.05
 sampling: instant
 time_law: eq5
 reverse: true
+parameterisation: arc_length
 path_error: {sampling_times_s: [0.5, 0.1, 0.5]}
 limits:
   wheel: {speed_mps: 1, acceleration_mps2: 2, jerk_mps3: 3}
@@ -51,6 +52,7 @@ fn what_is_left_out_takes_its_default() {
     assert_eq!((mission.clearance, mission.sampling_time), (0.05, 0.1));
     assert_eq!((mission.sampling, mission.time_law, mission.reverse), (Sampling::Mean, TimeLaw::Auto, false));
     assert_eq!(mission.path_error_times, [0.01, 0.02, 0.05, 0.1, 0.2, 0.5]);
+    assert_eq!(mission.parameterisation, Parameterisation::DEFAULT);
     assert_eq!(mission.limits, LimitsSpec::default());
     assert_eq!(mission.path, None);
 }
@@ -73,6 +75,7 @@ fn every_key_is_read() {
     assert_eq!((goal.yaw, goal.joints["blade"]), (Some(1.5), 0.0));
     assert_eq!((mission.clearance, mission.sampling_time), (0.1, 0.05));
     assert_eq!((mission.sampling, mission.time_law, mission.reverse), (Sampling::Instant, TimeLaw::Eq5, true));
+    assert_eq!(mission.parameterisation, Parameterisation::ArcLength);
     assert_eq!(mission.path_error_times, [0.1, 0.5]);
     let limits = mission.limits;
     assert_eq!([limits.wheel.speed, limits.wheel.acceleration, limits.wheel.jerk], [Some(1.0), Some(2.0), Some(3.0)]);
@@ -84,6 +87,28 @@ fn every_key_is_read() {
     assert_eq!([base.angular_acceleration, base.eta, base.min_speed], [Some(10.0), Some(0.5), Some(0.02)]);
     let Some(PathSpec::Bezier(segments)) = mission.path else { panic!("no segments") };
     assert_eq!(segments[1], [[4.0, 4.0], [4.0, 5.0], [4.0, 6.0], [4.0, 7.0]]);
+}
+
+#[test]
+fn laws_of_the_distance_driven_get_curves_that_stand_nowhere_unless_told_otherwise() {
+    let with = |lines: &str| good(&format!("{LEAST}{lines}")).parameterisation;
+    for law in ["eq5", "fixed_point", "printed"] {
+        assert_eq!(with(&format!("time_law: {law}\n")), Parameterisation::Flat);
+        assert_eq!(with(&format!("time_law: {law}\nparameterisation: arc_length\n")), Parameterisation::ArcLength);
+    }
+    for law in ["auto", "minco"] {
+        assert_eq!(with(&format!("time_law: {law}\n")), Parameterisation::DEFAULT);
+        assert_eq!(with(&format!("time_law: {law}\nparameterisation: flat\n")), Parameterisation::Flat);
+    }
+}
+
+#[test]
+fn every_parameterisation_is_read_back_from_its_word() {
+    for value in [Parameterisation::Flat, Parameterisation::ArcLength] {
+        let word = value.key();
+        assert_eq!(good(&format!("{LEAST}parameterisation: {word}\n")).parameterisation, value);
+        assert_eq!(<Parameterisation as clap::ValueEnum>::from_str(word, false), Ok(value));
+    }
 }
 
 #[test]

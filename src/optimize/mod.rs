@@ -3,6 +3,8 @@
 //! `sections` cuts the path at cusps and large spins; each driven section becomes one curve (`leg`): first guess (`initial`),
 //! cost and gradient ([`objective`] over [`minco`], [`flatness`], [`penalty`], [`contour`]), L-BFGS. A section whose curve is
 //! not sound is cut at the spin nearest to its worst piece, where the robot then stops, and both parts are tried again.
+//!
+//! With `parameterisation: arc_length` the polynomials are those of heading and arc length instead ([`steer`]).
 
 mod basis;
 pub mod contour;
@@ -20,6 +22,7 @@ pub(crate) mod test_robot;
 pub mod time_map;
 
 use crate::esdf::Esdf;
+use crate::mission::Parameterisation;
 use crate::robot::RobotModel;
 use crate::search::SearchPath;
 use crate::trajectory::{Ending, Leg, OptimiserOutcome, Trajectory, TrajectorySource};
@@ -37,6 +40,19 @@ pub fn optimize(path: &SearchPath, esdf: &Esdf, robot: &RobotModel, options: &Op
 
 /// [`optimize`] in any distance field.
 pub fn optimize_in<F: DistanceField>(
+    path: &SearchPath,
+    field: &F,
+    robot: &RobotModel,
+    options: &OptimizeOptions,
+) -> Trajectory {
+    match options.parameterisation {
+        Parameterisation::Flat => optimize_flat(path, field, robot, options),
+        Parameterisation::ArcLength => steer::optimize_steered(path, field, robot, options),
+    }
+}
+
+/// Positions as polynomials.
+fn optimize_flat<F: DistanceField>(
     path: &SearchPath,
     field: &F,
     robot: &RobotModel,

@@ -43,6 +43,7 @@ fn assert_joined(path: &SearchPath, trajectory: &Trajectory) {
                 state.pose.yaw = still.yaw_end;
                 state.joints = still.joints_to.clone();
             }
+            Leg::Steer(_) => panic!("not in the flat parameterisation"),
             Leg::Drive(drive) => {
                 let (curve, end) = (&drive.curve, drive.curve.duration());
                 near(curve.derivative(0, 0, 0.0), state.pose.x);
@@ -148,6 +149,7 @@ fn reverse_driving_and_spins_keep_heading_and_position() {
             Leg::Still(_) => 's',
             Leg::Drive(drive) if drive.reverse => 'r',
             Leg::Drive(_) => 'f',
+            Leg::Steer(_) => '?',
         })
         .collect();
     assert_eq!(kinds, "rsfsfs");

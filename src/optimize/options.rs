@@ -2,10 +2,13 @@
 
 use super::objective::Weights;
 use crate::math::lbfgs::LbfgsOptions;
+use crate::mission::Parameterisation;
 
 /// How to optimise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OptimizeOptions {
+    /// What the polynomials are of. Default [`Parameterisation::DEFAULT`].
+    pub parameterisation: Parameterisation,
     /// Clearance to aim at, m: what must be certified plus a margin for what sampling misses. Default 0.05.
     pub clearance: f64,
     /// A leg that ends with less than `clearance - clearance_tolerance` (m) at its contour points is cut, and the robot stops where
@@ -57,6 +60,7 @@ pub struct OptimizeOptions {
 impl Default for OptimizeOptions {
     fn default() -> Self {
         Self {
+            parameterisation: Parameterisation::DEFAULT,
             clearance: 0.05,
             clearance_tolerance: 0.02,
             dense: true,

@@ -10,7 +10,7 @@ use crate::diag::{Diagnostics, Severity};
 use crate::map::VoxelMap;
 use crate::robot::{MovingJoint, RobotModel};
 use crate::search::SearchPath;
-use crate::trajectory::{Leg, Trajectory};
+use crate::trajectory::{Leg, Trajectory, TrajectorySource};
 
 /// JSON knows neither NaN nor infinity.
 fn finite(value: f64) -> Option<f64> {
@@ -177,10 +177,13 @@ impl TrajectoryPart {
     pub fn new(trajectory: &Trajectory, metrics: Option<Metrics>) -> Self {
         let pieces = |leg: &Leg| match leg {
             Leg::Drive(drive) => drive.curve.pieces.len(),
+            Leg::Steer(steer) => steer.curve.pieces.len(),
             Leg::Still(_) => 0,
         };
+        let optimised = trajectory.source == TrajectorySource::Optimised;
         Self {
             source: names::source(trajectory.source).into(),
+            parameterisation: trajectory.parameterisation().filter(|_| optimised).map(|p| p.key().into()),
             pieces: trajectory.legs.iter().map(pieces).sum(),
             iterations: trajectory.optimiser.map(|o| o.iterations),
             ending: trajectory.optimiser.map(|o| names::ending(o.ending).into()),

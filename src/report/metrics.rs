@@ -11,7 +11,7 @@ use crate::command::CommandTable;
 use crate::math::poly::Piece;
 use crate::robot::RobotModel;
 use crate::search::{SearchMove, SearchPath, SearchState};
-use crate::trajectory::{DriveLeg, Leg, StillLeg, Trajectory};
+use crate::trajectory::{Leg, StillLeg, Trajectory};
 
 /// Length, duration and smoothness of a motion.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, JsonSchema)]
@@ -74,20 +74,22 @@ pub fn of_trajectory(trajectory: &Trajectory, robot: &RobotModel) -> Metrics {
     let mut sum = Integrals::default();
     for leg in &trajectory.legs {
         match leg {
-            Leg::Drive(drive) => add_drive(&mut sum, drive),
+            Leg::Drive(drive) => over_pieces(&mut sum, &drive.curve.pieces, add_instant),
             Leg::Still(still) => add_still(&mut sum, still, robot),
+            Leg::Steer(steer) => over_pieces(&mut sum, &steer.curve.pieces, add_steered_instant),
         }
     }
     sum.metrics()
 }
 
-fn add_drive(sum: &mut Integrals, drive: &DriveLeg) {
-    for piece in &drive.curve.pieces {
+/// Integrates over pieces: `add` adds an instant of one, at its parameter, with a weight.
+fn over_pieces(sum: &mut Integrals, pieces: &[Piece], add: fn(&mut Integrals, &Piece, f64, f64)) {
+    for piece in pieces {
         let cell = piece.duration / CELLS as f64;
         sum.time += piece.duration;
         for i in 0..CELLS {
             for (node, weight) in GAUSS {
-                add_instant(sum, piece, (i as f64 + node) * cell, weight * cell);
+                add(sum, piece, (i as f64 + node) * cell, weight * cell);
             }
         }
     }
@@ -110,6 +112,18 @@ fn add_instant(sum: &mut Integrals, piece: &Piece, u: f64, weight: f64) {
     }
     let joints = 2..piece.coefficients.len();
     sum.joint_jerk += weight * norm(joints.map(|d| piece.derivative(d, 3, u)));
+}
+
+/// An instant of a leg of heading and arc length: nothing is divided by the speed.
+fn add_steered_instant(sum: &mut Integrals, piece: &Piece, u: f64, weight: f64) {
+    let [turn, turn_rise] = [1, 2].map(|order| piece.derivative(0, order, u));
+    let [speed, rise, jerk] = [1, 2, 3].map(|order| piece.derivative(1, order, u));
+    sum.length += weight * speed.abs();
+    // The third derivative of the position, along the heading and across it.
+    sum.jerk += weight * (jerk - speed * turn * turn).hypot(2.0 * rise * turn + speed * turn_rise);
+    sum.acceleration += weight * rise.abs();
+    sum.angular_acceleration += weight * turn_rise.abs();
+    sum.joint_jerk += weight * norm((2..piece.coefficients.len()).map(|d| piece.derivative(d, 3, u)));
 }
 
 fn norm(values: impl Iterator<Item = f64>) -> f64 {

@@ -6,7 +6,7 @@ use crate::mission::Sampling;
 use crate::retime::MotionProfile;
 use crate::retime::course::Course;
 use crate::robot::RobotModel;
-use crate::trajectory::plane_curve::{Place, PlaneCurve};
+use crate::trajectory::plane_curve::Place;
 
 /// Distance between points of the replay that are measured, and between vertices of the reference, m.
 const STEP: f64 = 1e-3;
@@ -126,6 +126,23 @@ impl PathReference {
                         add(curved.curve.point(place), place);
                     }
                 }
+                Course::Steered(steered) => {
+                    // Every node is a vertex: corners and cusps lie between no two of them.
+                    let nodes: Vec<Place> = steered.curve.nodes().collect();
+                    let mut add_at = |place| {
+                        let pose = steered.pose(place);
+                        add([pose.x, pose.y], place);
+                    };
+                    for pair in nodes.windows(2) {
+                        let [from, to] = [pair[0], pair[1]].map(|place| steered.curve.travelled(place));
+                        let steps = ((to - from) / STEP).ceil().max(1.0);
+                        add_at(pair[0]);
+                        for i in 1..steps as usize {
+                            add_at(steered.curve.place_at_travelled(from + (to - from) * i as f64 / steps));
+                        }
+                    }
+                    add_at(steered.curve.end());
+                }
                 Course::Proportional(p) => {
                     let steps = (p.drive.abs() / STEP).ceil().max(1.0);
                     for i in 0..=steps as usize {
@@ -203,14 +220,22 @@ impl PathReference {
         let near = square(vertex.point, point).sqrt();
         match &self.courses[vertex.course as usize] {
             Course::Curved(curved) => {
-                let parameter = |k: usize| {
-                    let other = self.vertices.get(k).filter(|v| v.course == vertex.course);
-                    other.map(|v| curved.curve.parameter(v.place))
+                let bracket = self.bracket(nearest, |place| curved.curve.parameter(place));
+                let jets = |u: f64| {
+                    let place = curved.curve.place(u);
+                    [0, 1].map(|d| {
+                        let [value, first, second, _] = curved.curve.jet(d, place);
+                        [value, first, second]
+                    })
                 };
-                let own = curved.curve.parameter(vertex.place);
-                let low = nearest.checked_sub(1).and_then(parameter).unwrap_or(own);
-                let high = parameter(nearest + 1).unwrap_or(own);
-                near.min(distance_to_curve(&curved.curve, [low, own, high], point))
+                near.min(distance_to_curve(jets, bracket, point))
+            }
+            Course::Steered(steered) => {
+                let [low, own, high] = self.bracket(nearest, |place| steered.curve.parameter(place));
+                let jets = |u: f64| steered.curve.point_jet(steered.curve.place(u));
+                // The vertex may be a corner, so each side is a curve of its own.
+                let side = |from: f64, to: f64| distance_to_curve(jets, [from, 0.5 * (from + to), to], point);
+                near.min(side(low, own)).min(side(own, high))
             }
             Course::Proportional(p) if p.drive != 0.0 => {
                 let (sin, cos) = p.pose.yaw.sin_cos();
@@ -221,6 +246,14 @@ impl PathReference {
             }
             Course::Proportional(_) => near,
         }
+    }
+
+    /// Parameters of the vertices before, at and after one, as far as they are on its course.
+    fn bracket(&self, vertex: usize, parameter: impl Fn(Place) -> f64) -> [f64; 3] {
+        let course = self.vertices[vertex].course;
+        let of = |k: usize| self.vertices.get(k).filter(|v| v.course == course).map(|v| parameter(v.place));
+        let own = parameter(self.vertices[vertex].place);
+        [vertex.checked_sub(1).and_then(of).unwrap_or(own), own, of(vertex + 1).unwrap_or(own)]
     }
 
     /// The vertex nearest to a point: rings of cells about it, until no nearer one can follow.
@@ -261,11 +294,15 @@ impl PathReference {
 
 /// Distance from a point to the part of a curve between two parameters, from a first guess between them: Newton's steps on the
 /// foot's condition, halving the bracket where a step leaves it (at rest and near it the parameter is far from arc length).
-fn distance_to_curve(curve: &PlaneCurve, [mut low, mut u, mut high]: [f64; 3], point: [f64; 2]) -> f64 {
+/// `jets`: x and y with two derivatives by the parameter.
+fn distance_to_curve(
+    jets: impl Fn(f64) -> [[f64; 3]; 2],
+    [mut low, mut u, mut high]: [f64; 3],
+    point: [f64; 2],
+) -> f64 {
     let mut best = f64::INFINITY;
     for _ in 0..40 {
-        let at = curve.place(u);
-        let (x, y) = (curve.jet(0, at), curve.jet(1, at));
+        let [x, y] = jets(u);
         let offset = [x[0] - point[0], y[0] - point[1]];
         best = best.min(offset[0].hypot(offset[1]));
         let slope = offset[0] * x[1] + offset[1] * y[1];

@@ -171,6 +171,9 @@ pub struct SearchPart {
 pub struct TrajectoryPart {
     /// `optimised`, `search` (the fall-back) or `given`.
     pub source: String,
+    /// What the optimiser's polynomials are of: `flat` (positions) or `arc_length` (heading and arc length).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub parameterisation: Option<String>,
     /// Polynomial pieces.
     pub pieces: usize,
     /// Iterations of the optimiser.

@@ -6,11 +6,13 @@ use crate::geom::{Pose2, unwrap_near};
 use crate::trajectory::plane_curve::{CurveError, Place, PlaneCurve};
 use crate::trajectory::{DriveLeg, StillLeg};
 
+use super::steered::Steered;
+
 /// A value and its first three derivatives.
 pub type Jet = [f64; 4];
 
 /// A drive counts as straight, and its joints as proportional to arc length, where they are so within this (m, rad).
-const STRAIGHT: f64 = 1e-10;
+pub(super) const STRAIGHT: f64 = 1e-10;
 
 /// What a leg does, whenever it does it.
 #[derive(Debug, Clone)]
@@ -19,6 +21,8 @@ pub enum Course {
     Curved(Curved),
     /// Every actuator in proportion: a spin, joints alone, or a straight drive.
     Proportional(Proportional),
+    /// Heading and arc length, each as a function of the parameter.
+    Steered(Steered),
 }
 
 /// Driving along a curve.
@@ -94,6 +98,7 @@ impl Course {
         match self {
             Self::Curved(c) => c.travel(c.curve.length(), c.curve.total_turn()),
             Self::Proportional(p) => p.wheel_changes(),
+            Self::Steered(s) => s.travel(s.curve.end()),
         }
     }
 }

@@ -7,13 +7,14 @@ use super::RetimeError;
 use super::convolution::Convolution;
 use super::course::{Course, Curved, Proportional};
 use super::peaks::{peaks, slow_down};
+use super::steered::time_steered;
 use super::timed_leg::{Clock, TimedLeg};
 use super::warp::Warp;
 
 /// Shortest ramp of `minco` that is tried, s, and the factor to the next one.
 const RAMPS: (f64, f64) = (0.05, 1.5);
 /// Below this share of the limit, what Eq. 5 leaves is no speed to drive with.
-const LEAST_SPEED: f64 = 1e-3;
+pub(super) const LEAST_SPEED: f64 = 1e-3;
 
 /// What the laws need to know besides the leg.
 #[derive(Debug, Clone, Copy)]
@@ -37,6 +38,7 @@ pub struct Task<'a> {
 pub fn time_leg(course: &Course, law: TimeLaw, task: Task<'_>) -> Result<TimedLeg, RetimeError> {
     let curved = match course {
         Course::Proportional(p) => return Ok(proportional(p, task.robot)),
+        Course::Steered(steered) => return time_steered(steered, law, task),
         Course::Curved(curved) => curved,
     };
     match law {
@@ -65,7 +67,7 @@ pub fn time_leg(course: &Course, law: TimeLaw, task: Task<'_>) -> Result<TimedLe
 }
 
 /// Speed, acceleration and jerk that the centre's profile is made with, m/s, m/s^2, m/s^3.
-fn centre_limits(robot: &RobotModel) -> [f64; 3] {
+pub(super) fn centre_limits(robot: &RobotModel) -> [f64; 3] {
     let [v, a, j] = robot.wheel.planning();
     [v.min(robot.base.speed), a.min(robot.base.acceleration), j]
 }
@@ -127,7 +129,8 @@ fn convolved(
     slowed(leg, task)
 }
 
-fn slowed(leg: TimedLeg, task: Task<'_>) -> TimedLeg {
+/// A leg slowed down until every limit holds.
+pub(super) fn slowed(leg: TimedLeg, task: Task<'_>) -> TimedLeg {
     TimedLeg { stretch: slow_down(&leg.clock_peaks(true), &binding(task.robot), task.hold), ..leg }
 }
 
@@ -156,6 +159,7 @@ fn corrected(
     let left = v.min(wheel_speed - compensation);
     if left <= LEAST_SPEED * v {
         return Err(RetimeError::CompensationLeavesNoSpeed {
+            law: super::law_key(law),
             leg: task.leg,
             radius: 1.0 / largest_curvature(curved),
             half_track: curved.half_track,

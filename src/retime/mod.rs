@@ -9,6 +9,7 @@ pub mod course;
 pub mod law;
 pub mod peaks;
 pub mod profile;
+pub mod steered;
 pub mod timed_leg;
 pub mod warp;
 
@@ -52,10 +53,11 @@ pub enum RetimeError {
     /// Eq. 5 takes off more than there is.
     #[error(
         "time law `{law}` leaves {left:.3} m/s on leg {leg}: its tightest turn has a radius of {radius:.4} m, near or below half the track \
-         ({half_track:.4} m)",
-        law = "eq5"
+         ({half_track:.4} m)"
     )]
     CompensationLeavesNoSpeed {
+        /// Its key in the mission.
+        law: &'static str,
         /// Index of the leg.
         leg: usize,
         /// Least radius on it, m.
@@ -64,6 +66,19 @@ pub enum RetimeError {
         half_track: f64,
         /// v' of Eq. 5, m/s; not above zero, or as good as zero.
         left: f64,
+    },
+    /// A law of the arc length, on a leg that goes on moving while the arc length stands.
+    #[error(
+        "time law `{law}` is a profile of the distance driven, and leg {leg} stands at its own {time:.2} s: it turns on the spot, changes \
+         its direction, or moves joints alone"
+    )]
+    StandsInside {
+        /// Its key in the mission.
+        law: &'static str,
+        /// Index of the leg.
+        leg: usize,
+        /// Seconds of the optimiser's own timing since the leg's start.
+        time: f64,
     },
     /// A leg's curve has no heading somewhere.
     #[error("leg {leg}: {error}")]
@@ -110,6 +125,9 @@ impl Describe for RetimeError {
                     .number("half_track_m", *half_track)
                     .number("v_max_mps", *left)
             }
+            Self::StandsInside { time, .. } => Diagnostic::failure("retime/stands-inside", self)
+                .hint("use auto or minco, or `parameterisation: flat`, which stops there")
+                .number("time_s", *time),
             Self::Curve { .. } => Diagnostic::failure("retime/curve", self),
             Self::SamplingTime { .. } => Diagnostic::error("retime/sampling-time", self),
             Self::Joints { .. } => Diagnostic::error("retime/joints", self),
@@ -165,6 +183,7 @@ pub fn retime(
             Leg::Drive(d) => d.curve.pieces.first().map_or(2, |p| p.coefficients.len()).saturating_sub(2),
             Leg::Still(s) if s.joints_from.len() == s.joints_to.len() => s.joints_from.len(),
             Leg::Still(s) => s.joints_from.len().max(s.joints_to.len()),
+            Leg::Steer(s) => s.curve.pieces.first().map_or(2, |p| p.coefficients.len()).saturating_sub(2),
         };
         if joints != robot.joints.len() {
             return Err(RetimeError::Joints { leg, found: joints, expected: robot.joints.len() });
@@ -174,6 +193,9 @@ pub fn retime(
                 Course::drive(drive, robot.track_width).map_err(|error| RetimeError::Curve { leg, error })?
             }
             Leg::Still(still) => Course::still(still, robot.track_width),
+            Leg::Steer(steer) => {
+                Course::steer(steer, robot.track_width).map_err(|error| RetimeError::Curve { leg, error })?
+            }
         };
         time_leg(&course, options.law, Task { robot, hold, own_timing, one_segment, leg })
     });

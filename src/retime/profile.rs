@@ -118,6 +118,7 @@ impl MotionProfile {
         match &self.legs[0].course {
             Course::Curved(c) => c.curve.poly().pieces[0].coefficients.len() - 2,
             Course::Proportional(p) => p.joints.len(),
+            Course::Steered(s) => s.curve.joint_count(),
         }
     }
 

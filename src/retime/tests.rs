@@ -54,6 +54,7 @@ fn reversed(trajectory: &Trajectory) -> Trajectory {
             joints_from: still.joints_to.clone(),
             joints_to: still.joints_from.clone(),
         }),
+        Leg::Steer(_) => panic!("not in these tests"),
     });
     Trajectory { legs: legs.collect(), ..trajectory.clone() }
 }

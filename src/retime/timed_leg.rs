@@ -7,6 +7,7 @@ use crate::trajectory::plane_curve::Place;
 use super::convolution::Convolution;
 use super::course::{Course, Curved, Jet, Proportional, compose};
 use super::peaks::{Peaks, peaks};
+use super::steered::{NEAR_REST, Steered};
 use super::warp::Warp;
 
 /// Which quantity of the course is a function of time, and which function.
@@ -18,8 +19,10 @@ pub enum Clock {
     ArcLength(Convolution),
     /// The curve's parameter as a share of its range, scaled to the curve's length: \[CONV\] Eq. 2 as printed.
     Printed(Convolution),
-    /// The curve's parameter: its own seconds.
+    /// The curve's parameter: its own seconds, with ramps from and to rest.
     Own(Warp),
+    /// The curve's parameter: its own seconds, this many, of a curve that starts and ends at rest by itself.
+    Seconds(f64),
 }
 
 /// A leg, timed.
@@ -43,6 +46,7 @@ pub struct TimedLeg {
 enum At<'a> {
     Share(&'a Proportional, [f64; 4]),
     Curve { curved: &'a Curved, place: Place, arc: Option<f64>, clock: [f64; 3] },
+    Steered { steered: &'a Steered, place: Place, clock: [f64; 3] },
 }
 
 impl TimedLeg {
@@ -56,6 +60,7 @@ impl TimedLeg {
         match self.locate(t / self.stretch) {
             At::Share(p, [share, ..]) => p.pose(share),
             At::Curve { curved, place, .. } => curved.pose(place),
+            At::Steered { steered, place, .. } => steered.pose(place),
         }
     }
 
@@ -73,12 +78,17 @@ impl TimedLeg {
                 let dimensions = curved.curve.poly().pieces[0].coefficients.len();
                 out.extend((2..dimensions).map(|d| curved.curve.poly().pieces[place.piece].derivative(d, 0, place.u)));
             }
+            At::Steered { steered, place, .. } => steered.positions(place, out),
         }
     }
 
     /// What (left, right, joints…) move between two times since the leg's start, where that is known better than by a difference of
-    /// positions: on proportional courses. Appended to `out`; returns whether it is.
+    /// positions: on proportional courses, and in a curve's own seconds. Appended to `out`; returns whether it is.
     pub fn moved(&self, from: f64, to: f64, out: &mut Vec<f64>) -> bool {
+        if let (Course::Steered(steered), Clock::Seconds(_)) = (&self.course, &self.clock) {
+            steered.moved(from / self.stretch, to / self.stretch, out);
+            return true;
+        }
         let (Course::Proportional(p), Clock::Share(profile)) = (&self.course, &self.clock) else { return false };
         if profile.distance() <= 0.0 {
             return false;
@@ -112,6 +122,7 @@ impl TimedLeg {
         match &self.clock {
             Clock::Share(c) | Clock::ArcLength(c) | Clock::Printed(c) => c.duration(),
             Clock::Own(warp) => warp.duration(),
+            Clock::Seconds(seconds) => *seconds,
         }
     }
 
@@ -119,13 +130,23 @@ impl TimedLeg {
         let mut breaks: Vec<f64> = match &self.clock {
             Clock::Share(c) | Clock::ArcLength(c) | Clock::Printed(c) => c.corners().to_vec(),
             Clock::Own(warp) => warp.corners().to_vec(),
+            Clock::Seconds(seconds) => vec![0.0, *seconds],
         };
+        if let Course::Steered(steered) = &self.course {
+            let curve = &steered.curve;
+            breaks.extend(curve.nodes().map(|node| match &self.clock {
+                Clock::Share(c) | Clock::ArcLength(c) | Clock::Printed(c) => c.time_at(curve.travelled(node)),
+                Clock::Own(warp) => warp.time_at(curve.parameter(node)),
+                Clock::Seconds(_) => curve.parameter(node),
+            }));
+        }
         if let Course::Curved(curved) = &self.course {
             let curve = &curved.curve;
             breaks.extend(curve.nodes().map(|node| match &self.clock {
                 Clock::Share(c) | Clock::ArcLength(c) => c.time_at(curve.arc(node)),
                 Clock::Printed(c) => c.time_at(curve.parameter(node) / curve.duration() * c.distance()),
                 Clock::Own(warp) => warp.time_at(curve.parameter(node)),
+                Clock::Seconds(_) => curve.parameter(node),
             }));
         }
         breaks.sort_by(f64::total_cmp);
@@ -138,7 +159,7 @@ impl TimedLeg {
                 let at = c.at(t);
                 At::Share(p, if c.distance() > 0.0 { at.map(|v| v / c.distance()) } else { at })
             }
-            (Course::Proportional(p), Clock::Own(_)) => {
+            (Course::Proportional(p), Clock::Own(_) | Clock::Seconds(_)) => {
                 debug_assert!(false, "a proportional course has no timing of its own");
                 At::Share(p, [0.0; 4])
             }
@@ -156,16 +177,49 @@ impl TimedLeg {
                 let [u, d1, d2, d3] = warp.at(t);
                 At::Curve { curved, place: curved.curve.place(u), arc: None, clock: [d1, d2, d3] }
             }
+            (Course::Curved(curved), Clock::Seconds(_)) => {
+                At::Curve { curved, place: curved.curve.place(t), arc: None, clock: [1.0, 0.0, 0.0] }
+            }
+            (Course::Steered(steered), Clock::Seconds(_)) => {
+                At::Steered { steered, place: steered.curve.place(t), clock: [1.0, 0.0, 0.0] }
+            }
+            (Course::Steered(steered), Clock::Own(warp)) => {
+                let [u, d1, d2, d3] = warp.at(t);
+                At::Steered { steered, place: steered.curve.place(u), clock: [d1, d2, d3] }
+            }
+            (Course::Steered(steered), Clock::Share(c) | Clock::ArcLength(c) | Clock::Printed(c)) => {
+                let [s, v, a, j] = c.at(t);
+                let place = steered.curve.place_at_travelled(s);
+                At::Steered { steered, place, clock: steered.parameter_rates(place, [v, a, j]) }
+            }
         }
     }
 
     fn clock_rates(&self, t: f64, out: &mut Vec<[f64; 3]>) {
+        if let (Course::Steered(_), Clock::ArcLength(c)) = (&self.course, &self.clock) {
+            let (first, margin) = (out.len(), NEAR_REST * c.duration());
+            let since_rest = t.min(c.duration() - t).clamp(0.0, margin);
+            if since_rest < margin {
+                self.smooth_rates(t.clamp(margin, c.duration() - margin), out);
+                let share = since_rest / margin;
+                for [speed, acceleration, _] in &mut out[first..] {
+                    *speed *= share * share;
+                    *acceleration *= share;
+                }
+                return;
+            }
+        }
+        self.smooth_rates(t, out);
+    }
+
+    fn smooth_rates(&self, t: f64, out: &mut Vec<[f64; 3]>) {
         match self.locate(t) {
             At::Share(p, [_, d1, d2, d3]) => {
                 let changes = p.wheel_changes().into_iter().chain(p.joint_changes.iter().copied()).chain([p.drive]);
                 out.extend(changes.map(|q| compose([q, 0.0, 0.0], [d1, d2, d3])));
             }
             At::Curve { curved, place, clock, .. } => curved.rates(place, clock, out),
+            At::Steered { steered, place, clock } => steered.rates(place, clock, out),
         }
     }
 

@@ -7,9 +7,12 @@
 pub(crate) mod fixtures;
 pub mod given;
 pub mod plane_curve;
+mod standing;
+pub mod steered_curve;
 
 use crate::geom::Pose2;
 use crate::math::poly::PiecewisePoly;
+use crate::mission::Parameterisation;
 
 /// Planned motion from start to goal.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,6 +23,17 @@ pub struct Trajectory {
     pub source: TrajectorySource,
     /// How the optimiser ended; `None` where it did not run.
     pub optimiser: Option<OptimiserOutcome>,
+}
+
+impl Trajectory {
+    /// How its curves are written; `None` where it has none.
+    pub fn parameterisation(&self) -> Option<Parameterisation> {
+        self.legs.iter().find_map(|leg| match leg {
+            Leg::Drive(_) => Some(Parameterisation::Flat),
+            Leg::Steer(_) => Some(Parameterisation::ArcLength),
+            Leg::Still(_) => None,
+        })
+    }
 }
 
 /// Where a trajectory comes from.
@@ -64,6 +78,8 @@ pub enum Leg {
     Drive(DriveLeg),
     /// The base turns on the spot or stands; joints move in proportion.
     Still(StillLeg),
+    /// Heading and arc length as functions of time.
+    Steer(SteerLeg),
 }
 
 /// Driving along a plane curve; heading is the direction of motion, plus pi when backwards.
@@ -89,6 +105,17 @@ pub struct StillLeg {
     pub joints_from: Vec<f64>,
     /// Joint values at the end.
     pub joints_to: Vec<f64>,
+}
+
+/// Heading and arc length as polynomials in time (MATH section 10): spins, stops, cusps and reversing are ordinary points.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SteerLeg {
+    /// Where it begins; `pose.yaw` equals the curve's first heading.
+    pub pose: Pose2,
+    /// Dimensions: heading (rad, absolute, not wrapped), signed arc length driven (m, 0 at the start, falls when backwards), then one per
+    /// moving joint. Parameter: seconds of the optimiser's own timing. At rest (first two derivatives zero) at both ends; second
+    /// derivatives continuous inside.
+    pub curve: PiecewisePoly,
 }
 
 /// Straight drives between poses with spins in between: a trajectory through the positions of a sampled motion. Joints are

@@ -60,9 +60,15 @@ pub enum CurveError {
         /// Index of the piece.
         piece: usize,
     },
-    /// There is no piece, or a piece without x and y.
+    /// There is no piece, or a piece without its first two dimensions.
     #[error("the curve has no pieces")]
     Empty,
+    /// The heading changes so fast that no table of positions is fine enough.
+    #[error("piece {piece} of the curve turns too often to be driven")]
+    Winds {
+        /// Index of the piece.
+        piece: usize,
+    },
 }
 
 /// Speed |d(x, y)/du| with its first two derivatives, and d(heading)/du with its first two.
@@ -283,7 +289,7 @@ impl PlaneCurve {
 }
 
 /// Value and first four derivatives of a polynomial, by one Horner pass.
-fn jet(coefficients: &[f64], u: f64) -> [f64; 5] {
+pub(super) fn jet(coefficients: &[f64], u: f64) -> [f64; 5] {
     let mut d = [0.0; 5];
     for c in coefficients.iter().rev() {
         for k in (1..5).rev() {

@@ -57,6 +57,27 @@ fn a_robot_that_changes_shape_crosses_the_arch_bridges() {
 }
 
 #[test]
+fn motions_of_heading_and_arc_length_are_certified_and_say_so() {
+    for name in ["first", "arch_bridges"] {
+        let sandbox = Sandbox::new();
+        sandbox.ship("maps");
+        sandbox.ship(&format!("missions/{name}.yaml"));
+        let mission = sandbox.text(&format!("missions/{name}.yaml"));
+        sandbox.write("missions/b.yaml", mission + "parameterisation: arc_length\n");
+        sandbox.run(&["compile", "missions/b.yaml"]).expect(0);
+        let report: Value = serde_json::from_slice(&sandbox.read("out/b/report.json")).expect("JSON");
+        assert_eq!([&report["status"], &report["trajectory"]["source"]], ["certified", "optimised"], "{name}");
+        assert_eq!(report["trajectory"]["parameterisation"], "arc_length");
+        for file in ["commands.csv", "commands.mcap"] {
+            sandbox.run(&["check", &format!("out/b/{file}")]).expect(0);
+        }
+        let first = snapshot(&sandbox, "out/b");
+        sandbox.run(&["compile", "missions/b.yaml"]).expect(0);
+        assert!(first == snapshot(&sandbox, "out/b"), "{name}: the second run wrote other bytes");
+    }
+}
+
+#[test]
 fn where_the_program_stands_and_where_it_writes_change_no_motion() {
     let sandbox = Sandbox::compiled();
     let body = |path: &str| {

@@ -6,48 +6,48 @@ mod hermite;
 mod problem;
 mod solver;
 
-use crate::geom::Pose2;
+use super::OptimizeOptions;
+use super::contour::Contour;
+use super::penalty::Limits;
+use super::penalty::clearance::{ClearancePenalty, DistanceField};
 use crate::math::poly::{Piece, PiecewisePoly};
-use crate::optimize::OptimizeOptions;
-use crate::optimize::contour::Contour;
-use crate::optimize::penalty::Limits;
-use crate::optimize::penalty::clearance::{ClearancePenalty, DistanceField};
 use crate::robot::RobotModel;
 use crate::search::SearchPath;
+use crate::trajectory::{Ending, Leg, OptimiserOutcome, SteerLeg, StillLeg, Trajectory, TrajectorySource};
 
 use guess::guess;
-use problem::{Problem, Weights};
+use problem::{Layout, Problem, Weights};
 use solver::{SolverOptions, solve};
-
-/// Raw result, for trials.
-pub struct Steered {
-    pub pose: Pose2,
-    pub curve: PiecewisePoly,
-    pub iterations: usize,
-    pub evaluations: usize,
-    pub converged: bool,
-    pub gap: f64,
-    pub cost: f64,
-}
 
 pub fn env(name: &str, default: f64) -> f64 {
     std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
 }
 
-pub fn steer_raw<F: DistanceField>(
+/// Smooths a path as one motion from its first state to its last.
+pub fn optimize_steered<F: DistanceField>(
     path: &SearchPath,
     field: &F,
     robot: &RobotModel,
     options: &OptimizeOptions,
-) -> Option<Steered> {
+) -> Trajectory {
     let limits = Limits::new(robot, 1.0);
-    let first = guess(path, &limits)?;
+    let Some(first) = guess(path, &limits) else {
+        let state = &path.states[0];
+        let leg = StillLeg {
+            pose: state.pose,
+            yaw_end: state.pose.yaw,
+            joints_from: state.joints.clone(),
+            joints_to: state.joints.clone(),
+        };
+        let outcome = OptimiserOutcome { pieces: 0, iterations: 0, ending: Ending::Converged, cost: 0.0 };
+        return trajectory(Leg::Still(leg), outcome);
+    };
     let spacing = options.contour_spacing.unwrap_or_else(|| field.cell().clamp(0.03, 0.08));
     let contour = Contour::new(robot, spacing);
-    let clearance = ClearancePenalty::new(contour, robot, options.clearance, 0.05, field.cell());
+    let clearance = ClearancePenalty::new(contour, robot, options.clearance, options.clearance_scale, field.cell());
     let weights = Weights {
-        smoothness: env("SM", 0.05),
-        motion: env("MO", 100.0),
+        smoothness: env("SM", 0.5),
+        motion: env("MO", 30.0),
         clearance: env("CL", 200.0),
         clearance_unit: 0.05,
     };
@@ -61,32 +61,25 @@ pub fn steer_raw<F: DistanceField>(
         gap_tolerance: 1e-6,
     };
     let solved = solve(&mut problem, &mut x, &options);
-    let pieces = (0..layout.pieces)
-        .map(|k| {
-            let time = x[layout.duration(k)].exp();
-            let coefficients = (0..layout.dimensions)
-                .map(|d| {
-                    let mut data = [0.0; 6];
-                    for side in 0..2 {
-                        let at = layout.state(k + side, d, 0);
-                        data[3 * side] = x[at];
-                        data[3 * side + 1] = x[at + 1] * time;
-                        data[3 * side + 2] = x[at + 2] * time * time;
-                    }
-                    let unit = hermite::coefficients(&data);
-                    (0..6).map(|p| unit[p] / time.powi(p as i32)).collect()
-                })
-                .collect();
-            Piece { duration: time, coefficients }
-        })
-        .collect();
-    Some(Steered {
-        pose: path.states[0].pose,
-        curve: PiecewisePoly { pieces },
-        iterations: solved.iterations,
-        evaluations: solved.evaluations,
-        converged: solved.converged,
-        gap: solved.gap,
-        cost: solved.cost,
-    })
+    let leg = SteerLeg { pose: path.states[0].pose, curve: curve(layout, &x) };
+    let ending = if solved.converged { Ending::Converged } else { Ending::IterationLimit };
+    let outcome = OptimiserOutcome { pieces: layout.pieces, iterations: solved.iterations, ending, cost: solved.cost };
+    trajectory(Leg::Steer(leg), outcome)
+}
+
+fn trajectory(leg: Leg, outcome: OptimiserOutcome) -> Trajectory {
+    Trajectory { legs: vec![leg], source: TrajectorySource::Optimised, optimiser: Some(outcome) }
+}
+
+/// The unknowns as polynomials in seconds.
+fn curve(layout: Layout, x: &[f64]) -> PiecewisePoly {
+    let piece = |k: usize| {
+        let time = x[layout.duration(k)].exp();
+        let coefficients = (0..layout.dimensions).map(|dimension| {
+            let unit = hermite::coefficients(&layout.data(k, dimension, x, time));
+            unit.iter().enumerate().map(|(power, c)| c / time.powi(power as i32)).collect()
+        });
+        Piece { duration: time, coefficients: coefficients.collect() }
+    };
+    PiecewisePoly { pieces: (0..layout.pieces).map(piece).collect() }
 }

@@ -62,6 +62,18 @@ impl Layout {
     pub fn duration(self, piece: usize) -> usize {
         piece * self.block() + ORDERS * self.dimensions + 2
     }
+
+    /// A piece's data in unit time, for its duration.
+    pub fn data(self, piece: usize, dimension: usize, x: &[f64], time: f64) -> [f64; DATA] {
+        let mut data = [0.0; DATA];
+        for side in 0..2 {
+            let at = self.state(piece + side, dimension, 0);
+            data[3 * side] = x[at];
+            data[3 * side + 1] = x[at + 1] * time;
+            data[3 * side + 2] = x[at + 2] * time * time;
+        }
+        data
+    }
 }
 
 const HEADING: usize = 0;
@@ -315,12 +327,7 @@ impl<'a, F: DistanceField> Problem<'a, F> {
         let layout = self.layout;
         let time = x[layout.duration(piece)].exp();
         for (dimension, data) in self.data.iter_mut().enumerate() {
-            for side in 0..2 {
-                let at = layout.state(piece + side, dimension, 0);
-                data[3 * side] = x[at];
-                data[3 * side + 1] = x[at + 1] * time;
-                data[3 * side + 2] = x[at + 2] * time * time;
-            }
+            *data = layout.data(piece, dimension, x, time);
         }
         time
     }

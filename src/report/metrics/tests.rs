@@ -4,7 +4,8 @@ use crate::geom::Pose2;
 use crate::math::poly::PiecewisePoly;
 use crate::mission::Sampling;
 use crate::robot::{BaseLimits, MotionLimits, MovingJoint};
-use crate::trajectory::TrajectorySource;
+use crate::trajectory::steered_curve::SteeredCurve;
+use crate::trajectory::{DriveLeg, SteerLeg, TrajectorySource};
 
 fn robot() -> RobotModel {
     let limits =
@@ -59,6 +60,57 @@ fn a_parabola_driven_once_has_its_closed_forms() {
     near(m.mean_acceleration_mps2, (5f64.sqrt() - 1.0) / 2.0, 1e-9);
     near(m.mean_angular_acceleration_rads2, 0.4, 1e-9);
     near(m.mean_joint_jerk_rads3, 1.0, 1e-12);
+}
+
+fn steer(pieces: Vec<(f64, Vec<Vec<f64>>)>) -> SteerLeg {
+    let pieces = pieces.into_iter().map(|(duration, coefficients)| Piece { duration, coefficients });
+    SteerLeg { pose: Pose2::default(), curve: PiecewisePoly { pieces: pieces.collect() } }
+}
+
+#[test]
+fn a_circle_of_heading_and_arc_length_has_the_jerk_of_its_constant_twist() {
+    // v = 0.4 backwards, omega = 0.7: ||jerk|| = v omega^2; the blade's jerk is 6 * 0.2.
+    let leg = steer(vec![(3.0, vec![vec![0.0, 0.7], vec![0.0, -0.4], vec![0.0, 0.0, 0.0, 0.2]])]);
+    let m = of_trajectory(&trajectory(Leg::Steer(leg)), &robot());
+    near(m.time_s, 3.0, 1e-15);
+    near(m.length_m, 1.2, 1e-12);
+    near(m.mean_jerk_mps3, 0.4 * 0.49, 1e-12);
+    near(m.mean_joint_jerk_rads3, 1.2, 1e-12);
+    assert_eq!((m.mean_acceleration_mps2, m.mean_angular_acceleration_rads2), (0.0, 0.0));
+}
+
+#[test]
+fn a_leg_of_heading_and_arc_length_has_the_figures_of_its_positions_differences() {
+    // A spin that becomes a drive with a change of direction.
+    let leg = steer(vec![
+        (1.5, vec![vec![0.0, 0.3, 0.5, -0.2], vec![0.0, 0.0, 0.0, 0.0], vec![0.3]]),
+        (2.0, vec![vec![0.9, 1.0, -0.4, 0.1], vec![0.0, 0.6, 0.2, -0.25], vec![0.3]]),
+    ]);
+    let curve = SteeredCurve::new(&leg).unwrap();
+    let (steps, h) = (3500, 1e-3);
+    let (mut jerk, mut along, mut turning) = (0.0, 0.0, 0.0);
+    for i in 0..steps {
+        let t = (f64::from(i) + 0.5) * h;
+        if (t - 1.5).abs() < 3.0 * h || !(3.0 * h..3.5 - 3.0 * h).contains(&t) {
+            continue; // where derivatives jump, nothing to difference
+        }
+        let [x, y] = [0, 1].map(|axis| {
+            let at = |k: f64| curve.point_jet(curve.place(t + k * h))[axis][0];
+            (at(2.0) - 2.0 * at(1.0) + 2.0 * at(-1.0) - at(-2.0)) / (2.0 * h * h * h)
+        });
+        let second = |d: usize| {
+            let at = |k: f64| curve.jet(d, curve.place(t + k * h))[0];
+            (at(1.0) - 2.0 * at(0.0) + at(-1.0)) / (h * h)
+        };
+        jerk += x.hypot(y) * h;
+        along += second(1).abs() * h;
+        turning += second(0).abs() * h;
+    }
+    let m = of_trajectory(&trajectory(Leg::Steer(leg)), &robot());
+    near(m.mean_jerk_mps3, jerk / 3.5, 1e-2);
+    near(m.mean_acceleration_mps2, along / 3.5, 1e-2);
+    near(m.mean_angular_acceleration_rads2, turning / 3.5, 1e-2);
+    near(m.length_m, curve.length(), 1e-6);
 }
 
 #[test]

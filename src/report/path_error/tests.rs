@@ -1,7 +1,8 @@
 use super::*;
+use crate::math::poly::{Piece, PiecewisePoly};
 use crate::mission::TimeLaw;
 use crate::retime::{RetimeOptions, retime};
-use crate::trajectory::{fixtures, given};
+use crate::trajectory::{Leg, SteerLeg, Trajectory, TrajectorySource, fixtures, given};
 
 /// The C-curve of \[CONV\] section 3.
 const C_CURVE: [[f64; 2]; 4] = [[0.0, 0.0], [3.0, 0.0], [4.0, 1.0], [4.0, 4.0]];
@@ -79,4 +80,55 @@ fn a_corner_between_straight_legs_is_no_error() {
     };
     let row = plain(&[straight([0.0, 0.0], [1.0, 0.0]), straight([1.0, 0.0], [1.3, 0.9])], Sampling::Mean, 0.01);
     assert!(row.lateral_max < 1e-8, "{row:?}");
+}
+
+/// A leg of heading and arc length, at rest at each join: (seconds, turn, distance) a piece.
+fn steered(rows: &[[f64; 3]]) -> (MotionProfile, RobotModel) {
+    let mut at = [0.4, 0.0];
+    let pieces = rows.iter().map(|[seconds, changes @ ..]| {
+        let step = |d: usize| {
+            let mut c = vec![at[d], 0.0, 0.0, 0.0];
+            let powers = [35.0, -84.0, 70.0, -20.0].iter().enumerate();
+            c.extend(powers.map(|(k, a)| changes[d] * a / seconds.powi(4 + k as i32)));
+            c
+        };
+        let coefficients = vec![step(0), step(1)];
+        (0..2).for_each(|d| at[d] += changes[d]);
+        Piece { duration: *seconds, coefficients }
+    });
+    let curve = PiecewisePoly { pieces: pieces.collect() };
+    let leg = Leg::Steer(SteerLeg { pose: Pose2::new(0.1, -0.2, 0.4), curve });
+    let trajectory = Trajectory { legs: vec![leg], source: TrajectorySource::Optimised, optimiser: None };
+    let robot = fixtures::conv();
+    let options = RetimeOptions { law: TimeLaw::Minco, sampling_time: 0.1 };
+    (retime(&trajectory, &robot, &options).unwrap(), robot)
+}
+
+#[test]
+fn corners_and_cusps_within_one_leg_are_no_error() {
+    let (profile, robot) =
+        steered(&[[4.0, 0.0, 0.8], [3.0, 1.1, 0.0], [4.0, 0.0, 0.7], [4.0, 0.0, -0.3], [3.0, -2.0, 0.0]]);
+    let reference = PathReference::new(&profile);
+    for sampling_time in [0.01, 0.1] {
+        let options = SampleOptions { sampling_time, sampling: Sampling::Mean };
+        let table = sample_uncorrected(&profile, &robot, &options).unwrap();
+        let row = path_error_of_table(&table, profile.pose(0.0), &reference);
+        assert!(row.lateral_max < 1e-8 && row.end_point < 1e-8, "{row:?}");
+    }
+}
+
+#[test]
+fn distances_to_a_leg_of_heading_and_arc_length_are_those_to_its_positions() {
+    let (profile, _) = steered(&[[5.0, 1.4, 1.2], [3.0, 0.8, 0.0], [4.0, -0.9, -0.7]]);
+    let reference = PathReference::new(&profile);
+    let dense: Vec<[f64; 2]> = (0..=100_000)
+        .map(|i| profile.pose(profile.time() * f64::from(i) / 100_000.0))
+        .map(|pose| [pose.x, pose.y])
+        .collect();
+    for i in 0..100 {
+        let point = [-0.3 + 0.15 * f64::from(i % 10), -0.5 + 0.17 * f64::from(i / 10)];
+        let brute = dense.iter().map(|p| square(*p, point)).fold(f64::INFINITY, f64::min).sqrt();
+        let found = reference.distance(point);
+        assert!(found <= brute + 1e-12 && found > brute - 1e-6, "{point:?}: {found} vs {brute}");
+    }
 }

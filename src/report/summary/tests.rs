@@ -55,6 +55,7 @@ fn report() -> Report {
     });
     report.trajectory = Some(TrajectoryPart {
         source: "optimised".into(),
+        parameterisation: Some("flat".into()),
         pieces: 14,
         iterations: Some(61),
         ending: Some("converged".into()),

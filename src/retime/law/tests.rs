@@ -22,7 +22,7 @@ fn course(trajectory: &Trajectory) -> Curved {
     let [Leg::Drive(drive)] = trajectory.legs.as_slice() else { panic!("one drive") };
     match Course::drive(drive, 0.4).unwrap() {
         Course::Curved(curved) => curved,
-        Course::Proportional(_) => panic!("a curve"),
+        Course::Proportional(_) | Course::Steered(_) => panic!("a curve"),
     }
 }
 

@@ -110,7 +110,7 @@ fn directed(poly: PiecewisePoly) -> Result<PlaneCurve, f64> {
     let duration = poly.duration();
     let curve = PlaneCurve::new(poly).map_err(|error| match error {
         CurveError::Vanishes { parameter } => parameter,
-        CurveError::NotFinite { .. } | CurveError::Empty => 0.0,
+        CurveError::NotFinite { .. } | CurveError::Winds { .. } | CurveError::Empty => 0.0,
     })?;
     let least = LEAST_SPEED * curve.length() / duration;
     // The table is finest where the speed is least, so its nodes see every near-cusp.

@@ -1,0 +1,184 @@
+use super::*;
+use crate::geom::Pose2;
+use crate::math::poly::{Piece, PiecewisePoly};
+use crate::retime::{MotionProfile, RetimeOptions, retime};
+use crate::robot::MotionLimits;
+use crate::trajectory::{Leg, Trajectory, TrajectorySource, fixtures};
+
+/// The step from 0 to `size` in `t` seconds with three vanishing derivatives at both ends, from `start`.
+fn step(start: f64, size: f64, t: f64) -> Vec<f64> {
+    let mut c = vec![start, 0.0, 0.0, 0.0];
+    c.extend([35.0, -84.0, 70.0, -20.0].iter().enumerate().map(|(k, a)| size * a / t.powi(4 + k as i32)));
+    c
+}
+
+/// One piece a row: seconds, turn, distance, change of the blade.
+fn steps(rows: &[[f64; 4]]) -> Trajectory {
+    let mut at = [0.3, 0.0, 0.2];
+    let start = Pose2::new(1.0, 2.0, at[0]);
+    let pieces = rows.iter().map(|[seconds, changes @ ..]| {
+        let coefficients = (0..3).map(|d| step(at[d], changes[d], *seconds)).collect();
+        (0..3).for_each(|d| at[d] += changes[d]);
+        Piece { duration: *seconds, coefficients }
+    });
+    let leg = Leg::Steer(SteerLeg { pose: start, curve: PiecewisePoly { pieces: pieces.collect() } });
+    Trajectory { legs: vec![leg], source: TrajectorySource::Optimised, optimiser: None }
+}
+
+/// A spin, a bend, a cusp, backwards, blade alone.
+fn all_kinds() -> Trajectory {
+    steps(&[
+        [2.0, 1.2, 0.0, 0.4],
+        [5.0, -0.9, 1.4, 0.0],
+        [4.0, 0.5, -0.8, 0.3],
+        [1.0, 0.0, 0.0, 0.5],
+        [3.0, 0.0, 0.7, -0.2],
+    ])
+}
+
+fn bend() -> Trajectory {
+    steps(&[[5.0, 1.1, 1.4, 0.3]])
+}
+
+fn timed(trajectory: &Trajectory, law: TimeLaw) -> Result<MotionProfile, RetimeError> {
+    retime(trajectory, &fixtures::scr_db(), &RetimeOptions { law, sampling_time: 0.1 })
+}
+
+fn limits_hold(profile: &MotionProfile, robot: &RobotModel) {
+    for i in 0..=4000 {
+        let state = profile.at(profile.time() * f64::from(i) / 4000.0);
+        let keeps = |jet: &[f64; 4], limits: &MotionLimits| {
+            let limits = [limits.speed, limits.acceleration, limits.jerk];
+            (0..3).for_each(|k| assert!(jet[k + 1].abs() <= limits[k].unwrap() * (1.0 + 1e-7), "{jet:?} at {i}"));
+        };
+        state.wheels.iter().for_each(|jet| keeps(jet, &robot.wheel));
+        state.joints.iter().zip(&robot.joints).for_each(|(jet, joint)| keeps(jet, &joint.limits));
+    }
+}
+
+/// Wheels, joints and pose agree with each other and with differences of themselves.
+fn is_one_motion(profile: &MotionProfile, track: f64) {
+    let h = 1e-5;
+    for i in 1..80 {
+        let t = profile.time() * (f64::from(i) + 0.37) / 81.0;
+        let (low, at, high) = (profile.at(t - h), profile.at(t), profile.at(t + h));
+        let jets = |s: &crate::retime::MotionState| [s.wheels[0], s.wheels[1], s.joints[0]];
+        for ((low, at), high) in jets(&low).iter().zip(jets(&at)).zip(jets(&high)) {
+            for k in 0..3 {
+                let slope = (high[k] - low[k]) / (2.0 * h);
+                assert!((slope - at[k + 1]).abs() < 2e-4, "order {k} at {t}: {slope} {at:?}");
+            }
+        }
+        let (sin, cos) = at.pose.yaw.sin_cos();
+        let v = 0.5 * (at.wheels[0][1] + at.wheels[1][1]);
+        assert!(((high.pose.x - low.pose.x) / (2.0 * h) - v * cos).abs() < 1e-7);
+        assert!(((high.pose.y - low.pose.y) / (2.0 * h) - v * sin).abs() < 1e-7);
+        let omega = (at.wheels[1][1] - at.wheels[0][1]) / track;
+        assert!(((high.pose.yaw - low.pose.yaw) / (2.0 * h) - omega).abs() < 1e-7);
+    }
+}
+
+#[test]
+fn spins_cusps_and_stops_are_timed_by_the_legs_own_seconds_within_every_limit() {
+    let robot = fixtures::scr_db();
+    for law in [TimeLaw::Minco, TimeLaw::Auto] {
+        let profile = timed(&all_kinds(), law).unwrap();
+        limits_hold(&profile, &robot);
+        is_one_motion(&profile, robot.track_width);
+        assert!(profile.unrounded_time() >= 15.0 && profile.law_name().contains("minco"));
+        for t in [0.0, profile.time()] {
+            let state = profile.at(t);
+            state.wheels.iter().chain(&state.joints).for_each(|jet| assert!(jet[1].abs() < 1e-12, "{jet:?}"));
+        }
+        let end = profile.at(profile.time());
+        assert!((end.pose.yaw - 1.1).abs() < 1e-12 && (end.joints[0][0] - 1.2).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn a_leg_that_overdrives_is_slowed_down_uniformly_until_its_tightest_limit_just_holds() {
+    let robot = fixtures::scr_db();
+    let profile = timed(&steps(&[[0.8, 1.5, 1.4, 0.0]]), TimeLaw::Minco).unwrap();
+    limits_hold(&profile, &robot);
+    let mut largest = 0.0f64;
+    for i in 0..=20_000 {
+        let state = profile.at(profile.time() * f64::from(i) / 20_000.0);
+        let stretch = profile.time() / profile.unrounded_time();
+        for jet in state.wheels {
+            let limits = [0.5, 0.5, 2.0];
+            (0..3).for_each(|k| largest = largest.max(jet[k + 1].abs() * stretch.powi(k as i32 + 1) / limits[k]));
+        }
+        let centre = |k: usize| 0.5 * (state.wheels[0][k] + state.wheels[1][k]).abs() * stretch.powi(k as i32);
+        largest = largest.max(centre(1) / robot.base.speed).max(centre(2) / robot.base.acceleration);
+    }
+    assert!((0.9999..1.0 + 1e-7).contains(&largest), "{largest}");
+}
+
+#[test]
+fn held_means_add_up_to_the_travel() {
+    let profile = timed(&all_kinds(), TimeLaw::Minco).unwrap();
+    let steps = (profile.time() / 0.01).round() as usize;
+    let (means, end) = (profile.mean_speeds(steps), profile.at(profile.time()));
+    let sum = |i: usize| means.iter().map(|m| m[i]).sum::<f64>() * profile.time() / steps as f64;
+    assert!((sum(0) - end.wheels[0][0]).abs() < 1e-12 && (sum(1) - end.wheels[1][0]).abs() < 1e-12);
+    assert!((sum(2) - (end.joints[0][0] - 0.2)).abs() < 1e-12);
+}
+
+#[test]
+fn laws_of_the_distance_drive_a_leg_that_stands_nowhere_and_refuse_one_that_does() {
+    let robot = fixtures::scr_db();
+    let reference = timed(&bend(), TimeLaw::Minco).unwrap();
+    for law in [TimeLaw::Eq5, TimeLaw::FixedPoint] {
+        let profile = timed(&bend(), law).unwrap();
+        limits_hold(&profile, &robot);
+        is_one_motion(&profile, robot.track_width);
+        let (end, wanted) = (profile.pose(profile.time()), reference.pose(reference.time()));
+        assert!(end.distance(wanted) < 1e-12 && (end.yaw - wanted.yaw).abs() < 1e-12);
+        let refused = timed(&all_kinds(), law).unwrap_err();
+        assert!(matches!(refused, RetimeError::StandsInside { time, .. } if time == 0.0), "{refused:?}");
+    }
+    let times = [TimeLaw::Auto, TimeLaw::Minco, TimeLaw::Eq5, TimeLaw::FixedPoint]
+        .map(|law| timed(&bend(), law).unwrap().unrounded_time());
+    assert_eq!(times[0], times[1..].iter().copied().fold(f64::INFINITY, f64::min), "{times:?}");
+}
+
+#[test]
+fn no_law_of_the_distance_changes_the_set_of_poses() {
+    let trajectory = bend();
+    let [Leg::Steer(leg)] = trajectory.legs.as_slice() else { panic!("one leg") };
+    let curve = SteeredCurve::new(leg).unwrap();
+    let profile = timed(&trajectory, TimeLaw::FixedPoint).unwrap();
+    for i in 0..=200 {
+        let state = profile.at(profile.time() * f64::from(i) / 200.0);
+        let place = curve.place_at_travelled(0.5 * (state.wheels[0][0] + state.wheels[1][0]));
+        let wanted = curve.pose(place);
+        assert!(state.pose.distance(wanted) < 1e-10 && (state.pose.yaw - wanted.yaw).abs() < 1e-8, "at {i}");
+        assert!((state.joints[0][0] - curve.jet(2, place)[0]).abs() < 1e-8);
+    }
+}
+
+#[test]
+fn one_spin_and_one_straight_get_the_law_of_everything_that_moves_in_proportion() {
+    let robot = fixtures::scr_db();
+    for rows in [[3.0, 1.2, 0.0, 0.4], [6.0, 0.0, -1.5, 0.4], [2.0, 0.0, 0.0, 0.9]] {
+        let trajectory = steps(&[rows]);
+        let [Leg::Steer(leg)] = trajectory.legs.as_slice() else { panic!("one leg") };
+        let course = Course::steer(leg, robot.track_width).unwrap();
+        let Course::Proportional(p) = &course else { panic!("in proportion: {rows:?}") };
+        assert!((p.turn - rows[1]).abs() < 1e-12 && (p.drive - rows[2]).abs() < 1e-12);
+        assert!((p.joint_changes[0] - rows[3]).abs() < 1e-12);
+        for law in [TimeLaw::Minco, TimeLaw::Eq5] {
+            limits_hold(&timed(&trajectory, law).unwrap(), &robot);
+        }
+    }
+    // An arc moves both wheels in proportion too, but its pose does not move on a line.
+    let [Leg::Steer(leg)] = &bend().legs[..] else { panic!("one leg") };
+    assert!(matches!(Course::steer(leg, robot.track_width).unwrap(), Course::Steered(_)));
+}
+
+#[test]
+fn a_message_says_where_the_base_stands_and_what_to_use() {
+    use crate::diag::Describe;
+    let diagnostic = timed(&all_kinds(), TimeLaw::FixedPoint).unwrap_err().diagnostic();
+    assert!(diagnostic.message.contains("fixed_point") && diagnostic.hint.is_some_and(|h| h.contains("minco")));
+}
