@@ -7,6 +7,9 @@
 pub mod convolution;
 pub mod course;
 pub mod law;
+pub mod limits;
+pub mod metric;
+pub mod optimal;
 pub mod peaks;
 pub mod profile;
 pub mod timed_leg;
@@ -65,6 +68,12 @@ pub enum RetimeError {
         /// v' of Eq. 5, m/s; not above zero, or as good as zero.
         left: f64,
     },
+    /// The least time of a leg was not found.
+    #[error("leg {leg}: no least time was found along its curve")]
+    NoOptimum {
+        /// Index of the leg.
+        leg: usize,
+    },
     /// A leg's curve has no heading somewhere.
     #[error("leg {leg}: {error}")]
     Curve {
@@ -110,6 +119,7 @@ impl Describe for RetimeError {
                     .number("half_track_m", *half_track)
                     .number("v_max_mps", *left)
             }
+            Self::NoOptimum { .. } => Diagnostic::failure("retime/no-optimum", self).hint("use auto or fixed_point"),
             Self::Curve { .. } => Diagnostic::failure("retime/curve", self),
             Self::SamplingTime { .. } => Diagnostic::error("retime/sampling-time", self),
             Self::Joints { .. } => Diagnostic::error("retime/joints", self),
@@ -148,7 +158,7 @@ pub fn retime(
     if !(hold.is_finite() && hold > 0.0) {
         return Err(RetimeError::SamplingTime { sampling_time: hold });
     }
-    if matches!(options.law, TimeLaw::Optimal | TimeLaw::Wheel) {
+    if matches!(options.law, TimeLaw::Wheel) {
         return Err(RetimeError::NotYet { law: law_key(options.law) });
     }
     let given = trajectory.source == TrajectorySource::Given;
