@@ -6,6 +6,7 @@ pub mod block_tridiagonal;
 pub(crate) mod fd;
 pub mod gjk;
 pub mod lbfgs;
+pub mod pentadiagonal;
 pub mod poly;
 pub mod quadrature;
 pub mod smooth;

@@ -1,12 +1,17 @@
 //! The time laws: which clock a leg gets, and by how much it is slowed down.
 
+use std::sync::Arc;
+
 use crate::mission::TimeLaw;
 use crate::robot::RobotModel;
 
 use super::RetimeError;
 use super::convolution::Convolution;
 use super::course::{Course, Curved, Proportional};
-use super::peaks::{peaks, slow_down};
+use super::limits::{Scope, append_turn, limits, planning};
+use super::metric::Metric;
+use super::optimal::{self, Problem};
+use super::peaks::{HELD_JUMP, peaks, slow_down};
 use super::steered::time_steered;
 use super::timed_leg::{Clock, TimedLeg};
 use super::warp::Warp;
@@ -44,12 +49,16 @@ pub fn time_leg(course: &Course, law: TimeLaw, task: Task<'_>) -> Result<TimedLe
     match law {
         TimeLaw::Auto => {
             let mut best: Option<TimedLeg> = None;
-            for law in [TimeLaw::Minco, TimeLaw::Eq5, TimeLaw::FixedPoint] {
+            for law in [TimeLaw::Optimal, TimeLaw::Minco, TimeLaw::Eq5, TimeLaw::FixedPoint] {
                 let Ok(leg) = time_leg(course, law, task) else { continue };
+                if std::env::var("DBG").is_ok() { eprint!("{law:?} {:.4}; ", leg.duration()); }
+                let leg = if law == TimeLaw::Optimal { leg } else { guarded(TimedLeg { stretch: 1.0, ..leg }, task) };
+                if std::env::var("DBG").is_ok() { eprint!("guarded {:.4}; ", leg.duration()); }
                 if best.as_ref().is_none_or(|best| leg.duration() < best.duration()) {
                     best = Some(leg);
                 }
             }
+            if std::env::var("DBG").is_ok() { eprintln!(); }
             Ok(best.expect("fixed_point times every curve"))
         }
         TimeLaw::FixedPoint => {
@@ -62,7 +71,8 @@ pub fn time_leg(course: &Course, law: TimeLaw, task: Task<'_>) -> Result<TimedLe
         TimeLaw::Printed => Err(RetimeError::PrintedNeedsOneSegment),
         TimeLaw::Minco if task.own_timing => Ok(own(curved, task)),
         TimeLaw::Minco => Err(RetimeError::NoOwnTiming),
-        TimeLaw::Optimal | TimeLaw::Wheel => Err(RetimeError::NotYet { law: super::law_key(law) }),
+        TimeLaw::Optimal => optimal(curved, task),
+        TimeLaw::Wheel => Err(RetimeError::NotYet { law: super::law_key(law) }),
     }
 }
 
@@ -70,15 +80,6 @@ pub fn time_leg(course: &Course, law: TimeLaw, task: Task<'_>) -> Result<TimedLe
 pub(super) fn centre_limits(robot: &RobotModel) -> [f64; 3] {
     let [v, a, j] = robot.wheel.planning();
     [v.min(robot.base.speed), a.min(robot.base.acceleration), j]
-}
-
-/// What must hold after the slow-down, in the order of [`TimedLeg::rates`].
-fn binding(robot: &RobotModel) -> Vec<[Option<f64>; 3]> {
-    let of = |limits: &crate::robot::MotionLimits| [limits.speed, limits.acceleration, limits.jerk];
-    let mut all = vec![of(&robot.wheel); 2];
-    all.extend(robot.joints.iter().map(|joint| of(&joint.limits)));
-    all.push([Some(robot.base.speed), Some(robot.base.acceleration), None]);
-    all
 }
 
 /// The one law of everything that is linear in actuator space: the fastest profile of the share of the way under the limits of all
@@ -131,7 +132,7 @@ fn convolved(
 
 /// A leg slowed down until every limit holds.
 pub(super) fn slowed(leg: TimedLeg, task: Task<'_>) -> TimedLeg {
-    TimedLeg { stretch: slow_down(&leg.clock_peaks(true), &binding(task.robot), task.hold), ..leg }
+    TimedLeg { stretch: slow_down(&leg.clock_peaks(true), &limits(task.robot, Scope::Actuators), task.hold), ..leg }
 }
 
 /// \[CONV\] Eq. 5, applied once: the speed limit less what the wheels differ by under the uncorrected profile.
@@ -188,7 +189,7 @@ fn largest_curvature(curved: &Curved) -> f64 {
 /// The optimiser's own timing, with the pair of ramps by which the leg ends soonest after its slow-down.
 fn own(curved: &Curved, task: Task<'_>) -> TimedLeg {
     let seconds = curved.curve.duration();
-    let limits = binding(task.robot);
+    let limits = limits(task.robot, Scope::Actuators);
     let leg = |ramps: [f64; 2]| TimedLeg {
         course: Course::Curved(curved.clone()),
         clock: Clock::Own(Warp::new(seconds, ramps)),
@@ -234,6 +235,80 @@ fn own(curved: &Curved, task: Task<'_>) -> TimedLeg {
     let peaks = leg.clock_peaks(true);
     let stretch = slow_down(&peaks, &limits, task.hold);
     let centre = peaks.rates.last().map_or(0.0, |rates| rates[0]);
+    TimedLeg { stretch, speed_limit: centre / stretch, ..leg }
+}
+
+/// The least time under all limits.
+///
+/// # Errors
+/// It was not found.
+fn optimal(curved: &Curved, task: Task<'_>) -> Result<TimedLeg, RetimeError> {
+    let limits = planning(task.robot);
+    let metric = Metric::new(&curved.curve, |place| {
+        // The mean square of what the rows are of their limits.
+        let mut rows = Vec::with_capacity(limits.len());
+        curved.rates(place, [1.0, 0.0, 0.0], &mut rows);
+        let mut square = [0.0; 2];
+        for ([d1, d2, _], [limit, ..]) in rows[..rows.len() - 1].iter().zip(&limits) {
+            let weight = 0.5 / (limit * limit);
+            square[0] += weight * d1 * d1;
+            square[1] += weight * d1 * d2;
+        }
+        let rate = square[0].sqrt();
+        [rate, square[1] / rate]
+    });
+    let [speed, acceleration, jerk] = limits[0];
+    let profile = Convolution::fastest(metric.length(), [1.0, acceleration / speed, jerk / speed]);
+    let clock = Clock::Metric(Arc::new(metric), profile);
+    let leg = TimedLeg {
+        course: Course::Curved(curved.clone()),
+        clock,
+        stretch: 1.0,
+        law: Some(TimeLaw::Optimal),
+        speed_limit: 0.0,
+        compensation: 0.0,
+    };
+    paced(leg, task)
+}
+
+/// A leg at the pace of the least time under all limits; its clock is the reference.
+///
+/// # Errors
+/// The least time was not found.
+pub(super) fn paced(leg: TimedLeg, task: Task<'_>) -> Result<TimedLeg, RetimeError> {
+    let limits = planning(task.robot);
+    let [_, acceleration, jerk] = limits[0];
+    let pace = {
+        let rates = |t: f64, out: &mut Vec<[f64; 3]>| {
+            let first = out.len();
+            leg.clock_rates(t, out);
+            append_turn(task.robot, first, out);
+        };
+        let problem = Problem {
+            breaks: &leg.clock_breaks(),
+            limits: &limits,
+            jerk_of_jump: HELD_JUMP / task.hold,
+            step: 0.125 * acceleration / jerk,
+        };
+        optimal::fastest(&problem, rates).ok_or(RetimeError::NoOptimum { leg: task.leg })?
+    };
+    let leg = TimedLeg { clock: Clock::Paced(Box::new(leg.clock), pace), ..leg };
+    Ok(guarded(leg, task))
+}
+
+/// Slowed down until every limit holds, the base's included.
+pub(super) fn guarded(leg: TimedLeg, task: Task<'_>) -> TimedLeg {
+    let found = peaks(&leg.clock_breaks(), true, |t, out| {
+        let first = out.len();
+        leg.clock_rates(t, out);
+        append_turn(task.robot, first, out);
+    });
+    let stretch = slow_down(&found, &limits(task.robot, Scope::Everything), task.hold);
+    if std::env::var("DBG").is_ok() && leg.law == Some(TimeLaw::Optimal) {
+        let l = limits(task.robot, Scope::Everything);
+        eprintln!("stretch {stretch:.5} {:?}", found.rates.iter().zip(&l).map(|(r, l)| [0, 1, 2].map(|k| (1e4 * r[k] / l[k].unwrap_or(1e9)).round() / 1e4)).collect::<Vec<_>>());
+    }
+    let centre = found.rates[found.rates.len() - 3][0];
     TimedLeg { stretch, speed_limit: centre / stretch, ..leg }
 }
 

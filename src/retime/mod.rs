@@ -7,6 +7,9 @@
 pub mod convolution;
 pub mod course;
 pub mod law;
+pub mod limits;
+pub mod metric;
+pub mod optimal;
 pub mod peaks;
 pub mod profile;
 pub mod steered;
@@ -80,6 +83,12 @@ pub enum RetimeError {
         /// Seconds of the optimiser's own timing since the leg's start.
         time: f64,
     },
+    /// The least time of a leg was not found.
+    #[error("leg {leg}: no least time was found along its curve")]
+    NoOptimum {
+        /// Index of the leg.
+        leg: usize,
+    },
     /// A leg's curve has no heading somewhere.
     #[error("leg {leg}: {error}")]
     Curve {
@@ -128,6 +137,7 @@ impl Describe for RetimeError {
             Self::StandsInside { time, .. } => Diagnostic::failure("retime/stands-inside", self)
                 .hint("use auto or minco, or `parameterisation: flat`, which stops there")
                 .number("time_s", *time),
+            Self::NoOptimum { .. } => Diagnostic::failure("retime/no-optimum", self).hint("use auto or fixed_point"),
             Self::Curve { .. } => Diagnostic::failure("retime/curve", self),
             Self::SamplingTime { .. } => Diagnostic::error("retime/sampling-time", self),
             Self::Joints { .. } => Diagnostic::error("retime/joints", self),
@@ -166,7 +176,7 @@ pub fn retime(
     if !(hold.is_finite() && hold > 0.0) {
         return Err(RetimeError::SamplingTime { sampling_time: hold });
     }
-    if matches!(options.law, TimeLaw::Optimal | TimeLaw::Wheel) {
+    if matches!(options.law, TimeLaw::Wheel) {
         return Err(RetimeError::NotYet { law: law_key(options.law) });
     }
     let given = trajectory.source == TrajectorySource::Given;

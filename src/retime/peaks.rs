@@ -9,7 +9,7 @@ const WORTH_REFINING: f64 = 0.9;
 /// An acceleration that jumps by less than this share of its peak is rounding, not a jump.
 const JUMP: f64 = 1e-6;
 /// Share of a jump that falls between two consecutive differences of interval means, at worst: where it lies in an interval's middle.
-const HELD_JUMP: f64 = 0.75;
+pub const HELD_JUMP: f64 = 0.75;
 
 /// Peaks over time, one entry an actuator.
 #[derive(Debug, Clone, PartialEq)]

@@ -68,7 +68,7 @@ impl MotionProfile {
         if self.law != TimeLaw::Auto {
             return name;
         }
-        let candidates = [TimeLaw::Minco, TimeLaw::Eq5, TimeLaw::FixedPoint];
+        let candidates = [TimeLaw::Optimal, TimeLaw::Minco, TimeLaw::Eq5, TimeLaw::FixedPoint];
         let chosen: Vec<&str> = candidates
             .into_iter()
             .filter(|law| self.legs.iter().any(|leg| leg.law == Some(*law)))

@@ -13,7 +13,7 @@ use crate::trajectory::steered_curve::SteeredCurve;
 use super::RetimeError;
 use super::convolution::Convolution;
 use super::course::{Course, Proportional, STRAIGHT, compose};
-use super::law::{LEAST_SPEED, Task, centre_limits, slowed};
+use super::law::{guarded, paced, LEAST_SPEED, Task, centre_limits, slowed};
 use super::peaks::peaks;
 use super::timed_leg::{Clock, TimedLeg};
 
@@ -161,14 +161,10 @@ pub(super) fn time_steered(steered: &Steered, law: TimeLaw, task: Task<'_>) -> R
     let limits = centre_limits(task.robot);
     match law {
         TimeLaw::Auto => {
-            let mut best = own(steered, task);
-            for law in [TimeLaw::Eq5, TimeLaw::FixedPoint] {
-                let Ok(leg) = time_steered(steered, law, task) else { continue };
-                if leg.duration() < best.duration() {
-                    best = leg;
-                }
-            }
-            Ok(best)
+            let best = guarded(TimedLeg { stretch: 1.0, ..own(steered, task) }, task);
+            let least = time_steered(steered, TimeLaw::Optimal, task);
+            if std::env::var("DBG").is_ok() { eprintln!("own {:.3} optimal {:?}", best.duration(), least.as_ref().map(|l| l.duration())); }
+            Ok(least.ok().filter(|leg| leg.duration() < best.duration()).unwrap_or(best))
         }
         TimeLaw::Minco => Ok(own(steered, task)),
         TimeLaw::FixedPoint => {
@@ -197,7 +193,8 @@ pub(super) fn time_steered(steered: &Steered, law: TimeLaw, task: Task<'_>) -> R
             Ok(slowed(convolved(steered, law, left.min(limits[0]), task.robot), task))
         }
         TimeLaw::Printed => Err(RetimeError::PrintedNeedsOneSegment),
-        TimeLaw::Optimal | TimeLaw::Wheel => Err(RetimeError::NotYet { law: super::law_key(law) }),
+        TimeLaw::Optimal => paced(TimedLeg { stretch: 1.0, law: Some(law), ..own(steered, task) }, task),
+        TimeLaw::Wheel => Err(RetimeError::NotYet { law: super::law_key(law) }),
     }
 }
 

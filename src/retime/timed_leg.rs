@@ -1,17 +1,21 @@
 //! One leg with its clock: what every actuator does at every time since the leg's start.
 
+use std::sync::Arc;
+
 use crate::geom::Pose2;
 use crate::mission::TimeLaw;
 use crate::trajectory::plane_curve::Place;
 
 use super::convolution::Convolution;
 use super::course::{Course, Curved, Jet, Proportional, compose};
+use super::metric::Metric;
+use super::optimal::Pace;
 use super::peaks::{Peaks, peaks};
 use super::steered::{NEAR_REST, Steered};
 use super::warp::Warp;
 
 /// Which quantity of the course is a function of time, and which function.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Clock {
     /// The share of a proportional course, 0 to 1.
     Share(Convolution),
@@ -23,6 +27,59 @@ pub enum Clock {
     Own(Warp),
     /// The curve's parameter: its own seconds, this many, of a curve that starts and ends at rest by itself.
     Seconds(f64),
+    /// Length in a metric of the curve's.
+    Metric(Arc<Metric>, Convolution),
+    /// What another clock says, at that clock's time.
+    Paced(Box<Clock>, Pace),
+}
+
+impl Clock {
+    /// Duration, s.
+    pub fn duration(&self) -> f64 {
+        match self {
+            Self::Share(c) | Self::ArcLength(c) | Self::Printed(c) | Self::Metric(_, c) => c.duration(),
+            Self::Own(warp) => warp.duration(),
+            Self::Seconds(seconds) => *seconds,
+            Self::Paced(_, pace) => pace.duration(),
+        }
+    }
+
+    /// Times between which it is smooth, ascending.
+    fn corners(&self) -> Vec<f64> {
+        match self {
+            Self::Share(c) | Self::ArcLength(c) | Self::Printed(c) => c.corners().to_vec(),
+            Self::Own(warp) => warp.corners().to_vec(),
+            Self::Seconds(seconds) => vec![0.0, *seconds],
+            Self::Metric(metric, c) => {
+                c.corners().into_iter().chain(metric.nodes().map(|length| c.time_at(length))).collect()
+            }
+            // A pace has a corner wherever its reference has one that matters.
+            Self::Paced(_, pace) => pace.corners().collect(),
+        }
+    }
+
+    /// Its quantity and three derivatives at a time.
+    fn at(&self, t: f64) -> [f64; 4] {
+        match self {
+            Self::Share(c) | Self::ArcLength(c) | Self::Printed(c) | Self::Metric(_, c) => c.at(t),
+            Self::Own(warp) => warp.at(t),
+            Self::Seconds(_) => [t, 1.0, 0.0, 0.0],
+            Self::Paced(reference, pace) => {
+                let [t, p1, p2, p3] = pace.at(t);
+                let [value, d1, d2, d3] = reference.at(t);
+                let [d1, d2, d3] = compose([d1, d2, d3], [p1, p2, p3]);
+                [value, d1, d2, d3]
+            }
+        }
+    }
+
+    /// The clock that says which quantity this is.
+    fn root(&self) -> &Self {
+        match self {
+            Self::Paced(reference, _) => reference.root(),
+            root => root,
+        }
+    }
 }
 
 /// A leg, timed.
@@ -52,7 +109,7 @@ enum At<'a> {
 impl TimedLeg {
     /// Seconds from rest to rest.
     pub fn duration(&self) -> f64 {
-        self.stretch * self.clock_duration()
+        self.stretch * self.clock.duration()
     }
 
     /// Pose at a time since the leg's start.
@@ -118,84 +175,79 @@ impl TimedLeg {
         self.clock_breaks().iter().map(|t| t * self.stretch).collect()
     }
 
-    fn clock_duration(&self) -> f64 {
-        match &self.clock {
-            Clock::Share(c) | Clock::ArcLength(c) | Clock::Printed(c) => c.duration(),
-            Clock::Own(warp) => warp.duration(),
-            Clock::Seconds(seconds) => *seconds,
-        }
-    }
-
-    fn clock_breaks(&self) -> Vec<f64> {
-        let mut breaks: Vec<f64> = match &self.clock {
-            Clock::Share(c) | Clock::ArcLength(c) | Clock::Printed(c) => c.corners().to_vec(),
-            Clock::Own(warp) => warp.corners().to_vec(),
-            Clock::Seconds(seconds) => vec![0.0, *seconds],
-        };
+    /// Times between which the leg's motion is smooth, before the slow-down; ascending.
+    pub fn clock_breaks(&self) -> Vec<f64> {
+        let mut breaks = self.clock.corners();
         if let Course::Steered(steered) = &self.course {
             let curve = &steered.curve;
-            breaks.extend(curve.nodes().map(|node| match &self.clock {
-                Clock::Share(c) | Clock::ArcLength(c) | Clock::Printed(c) => c.time_at(curve.travelled(node)),
-                Clock::Own(warp) => warp.time_at(curve.parameter(node)),
-                Clock::Seconds(_) => curve.parameter(node),
-            }));
+            match &self.clock {
+                Clock::Share(c) | Clock::ArcLength(c) | Clock::Printed(c) => {
+                    breaks.extend(curve.nodes().map(|node| c.time_at(curve.travelled(node))));
+                }
+                Clock::Own(warp) => breaks.extend(curve.nodes().map(|node| warp.time_at(curve.parameter(node)))),
+                Clock::Seconds(_) => breaks.extend(curve.nodes().map(|node| curve.parameter(node))),
+                Clock::Metric(..) | Clock::Paced(..) => (), // The curve's nodes are among their corners.
+            }
         }
         if let Course::Curved(curved) = &self.course {
             let curve = &curved.curve;
-            breaks.extend(curve.nodes().map(|node| match &self.clock {
-                Clock::Share(c) | Clock::ArcLength(c) => c.time_at(curve.arc(node)),
-                Clock::Printed(c) => c.time_at(curve.parameter(node) / curve.duration() * c.distance()),
-                Clock::Own(warp) => warp.time_at(curve.parameter(node)),
-                Clock::Seconds(_) => curve.parameter(node),
-            }));
+            match &self.clock {
+                Clock::Share(c) | Clock::ArcLength(c) => breaks.extend(curve.nodes().map(|n| c.time_at(curve.arc(n)))),
+                Clock::Printed(c) => {
+                    let share = |node| curve.parameter(node) / curve.duration();
+                    breaks.extend(curve.nodes().map(|node| c.time_at(share(node) * c.distance())));
+                }
+                Clock::Own(warp) => breaks.extend(curve.nodes().map(|node| warp.time_at(curve.parameter(node)))),
+                Clock::Seconds(_) => breaks.extend(curve.nodes().map(|node| curve.parameter(node))),
+                Clock::Metric(..) | Clock::Paced(..) => (), // The curve's nodes are among their corners.
+            }
         }
         breaks.sort_by(f64::total_cmp);
         breaks
     }
 
     fn locate(&self, t: f64) -> At<'_> {
-        match (&self.course, &self.clock) {
+        let at = self.clock.at(t);
+        match (&self.course, self.clock.root()) {
             (Course::Proportional(p), Clock::Share(c) | Clock::ArcLength(c) | Clock::Printed(c)) => {
-                let at = c.at(t);
                 At::Share(p, if c.distance() > 0.0 { at.map(|v| v / c.distance()) } else { at })
             }
-            (Course::Proportional(p), Clock::Own(_) | Clock::Seconds(_)) => {
+            (Course::Proportional(p), _) => {
                 debug_assert!(false, "a proportional course has no timing of its own");
                 At::Share(p, [0.0; 4])
             }
-            (Course::Curved(curved), Clock::Share(c) | Clock::ArcLength(c)) => {
-                let [s, v, a, j] = c.at(t);
+            (Course::Curved(curved), Clock::Share(_) | Clock::ArcLength(_)) => {
+                let [s, v, a, j] = at;
                 let place = curved.curve.place_at_arc(s);
                 At::Curve { curved, place, arc: Some(s), clock: curved.parameter_rates(place, [v, a, j]) }
             }
             (Course::Curved(curved), Clock::Printed(c)) => {
                 let scale = curved.curve.duration() / c.distance();
-                let [u, d1, d2, d3] = c.at(t).map(|v| v * scale);
+                let [u, d1, d2, d3] = at.map(|v| v * scale);
                 At::Curve { curved, place: curved.curve.place(u), arc: None, clock: [d1, d2, d3] }
             }
-            (Course::Curved(curved), Clock::Own(warp)) => {
-                let [u, d1, d2, d3] = warp.at(t);
+            (Course::Curved(curved), Clock::Metric(metric, _)) => {
+                let (place, rates) = metric.at(at[0]);
+                At::Curve { curved, place, arc: None, clock: compose(rates, [at[1], at[2], at[3]]) }
+            }
+            (Course::Curved(curved), _) => {
+                let [u, d1, d2, d3] = at;
                 At::Curve { curved, place: curved.curve.place(u), arc: None, clock: [d1, d2, d3] }
             }
-            (Course::Curved(curved), Clock::Seconds(_)) => {
-                At::Curve { curved, place: curved.curve.place(t), arc: None, clock: [1.0, 0.0, 0.0] }
-            }
-            (Course::Steered(steered), Clock::Seconds(_)) => {
-                At::Steered { steered, place: steered.curve.place(t), clock: [1.0, 0.0, 0.0] }
-            }
-            (Course::Steered(steered), Clock::Own(warp)) => {
-                let [u, d1, d2, d3] = warp.at(t);
-                At::Steered { steered, place: steered.curve.place(u), clock: [d1, d2, d3] }
-            }
-            (Course::Steered(steered), Clock::Share(c) | Clock::ArcLength(c) | Clock::Printed(c)) => {
-                let [s, v, a, j] = c.at(t);
+            (Course::Steered(steered), Clock::Share(_) | Clock::ArcLength(_) | Clock::Printed(_)) => {
+                let [s, v, a, j] = at;
                 let place = steered.curve.place_at_travelled(s);
                 At::Steered { steered, place, clock: steered.parameter_rates(place, [v, a, j]) }
+            }
+            (Course::Steered(steered), _) => {
+                let [u, d1, d2, d3] = at;
+                At::Steered { steered, place: steered.curve.place(u), clock: [d1, d2, d3] }
             }
         }
     }
 
-    fn clock_rates(&self, t: f64, out: &mut Vec<[f64; 3]>) {
+    /// Speed, acceleration and jerk of (left, right, joints…, centre) before the slow-down, appended to `out`.
+    pub fn clock_rates(&self, t: f64, out: &mut Vec<[f64; 3]>) {
         if let (Course::Steered(_), Clock::ArcLength(c)) = (&self.course, &self.clock) {
             let (first, margin) = (out.len(), NEAR_REST * c.duration());
             let since_rest = t.min(c.duration() - t).clamp(0.0, margin);

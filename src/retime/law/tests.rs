@@ -67,3 +67,24 @@ fn a_straight_line_takes_the_known_time_under_every_law_that_may_time_it() {
         assert_eq!((profile.v_max(), profile.v_comp()), (0.5, 0.0));
     }
 }
+
+#[test]
+fn dbg_optimal() {
+    let robot = fixtures::conv();
+    for (name, best) in [("line", 11.5), ("c_curve", 17.4432), ("s_curve", 17.1396), ("arbitrary", 12.0655)] {
+        if name == "line" { continue; }
+        let (trajectory, task) = (path(name), task(&robot, false));
+        let curved = course(&trajectory);
+        let mut times = vec![];
+        let mut leg = None;
+        for _ in 0..10 {
+            let t = std::time::Instant::now();
+            leg = Some(optimal(&curved, task).unwrap());
+            times.push(t.elapsed().as_secs_f64() * 1e3);
+        }
+        let leg = leg.unwrap();
+        times.sort_by(f64::total_cmp);
+        eprintln!("{name}: {} ({:+.3} %) stretch {} before {:+.3} %, {:.2} ms", leg.duration(), (leg.duration() / best - 1.0) * 100.0, leg.stretch,
+            (leg.duration() / leg.stretch / best - 1.0) * 100.0, times[0]);
+    }
+}

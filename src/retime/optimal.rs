@@ -1,0 +1,44 @@
+//! The least time along a curve in actuator space under speed, acceleration and jerk limits of every row.
+//!
+//! The curve comes with a *reference clock*: rows q(t) from rest to rest, t in `[0, duration]`, every derivative bounded. The law is
+//! sought as b(t) = (dt/dtau)^2 > 0, tau the new time: then
+//!
+//! `dq/dtau = q' sqrt(b)`, `d2q/dtau2 = q'' b + q' b'/2`, `d3q/dtau3 = sqrt(b) (q''' b + 3/2 q'' b' + q' b''/2)`,
+//!
+//! so speed is a cap on b, acceleration is linear in b, and only the jerk is not convex. With b a quadratic B-spline ([`grid`]) the
+//! acceleration is continuous and the jerk bounded. The time, the integral of dt/sqrt(b), falls from a feasible start by an
+//! interior-point method ([`barrier`]) that never leaves the limits: O(cells) a step. [`Pace`] is tau as a function, exactly.
+//!
+//! Knows nothing of wheels, courses or robots: rows, limits and breaks.
+
+mod barrier;
+mod grid;
+mod pace;
+
+pub use pace::Pace;
+
+use grid::Grid;
+
+/// A curve in actuator space with its reference clock, and what must hold along it.
+#[derive(Debug, Clone, Copy)]
+pub struct Problem<'a> {
+    /// Reference times between which the rows are smooth, ascending, both ends included. Fewer derivatives are continuous across
+    /// them, or it is where samples are well placed.
+    pub breaks: &'a [f64],
+    /// Speed, acceleration and jerk limit of every row; infinite where there is none.
+    pub limits: &'a [[f64; 3]],
+    /// Jerk that a jump of acceleration by 1 counts as, 1/s: such a jump is a jerk impulse, and what it does depends on for how long
+    /// commands are held.
+    pub jerk_of_jump: f64,
+    /// About how long a cell should take, s.
+    pub step: f64,
+}
+
+/// The fastest clock for the curve that `rates` gives (appends every row's first three derivatives at a reference time), limits kept at
+/// the grid's points: between them they may be exceeded by a little. `None`: the curve does not move, or is not finite.
+pub fn fastest(problem: &Problem<'_>, mut rates: impl FnMut(f64, &mut Vec<[f64; 3]>)) -> Option<Pace> {
+    let grid = Grid::new(problem, &mut rates)?;
+    let solution = barrier::solve(problem, &grid)?;
+    if std::env::var("DBG").is_ok() { eprintln!("cells {} steps {}", grid.cells(), solution.steps); }
+    Some(Pace::new(&grid.knots, solution.cells.into_iter()))
+}
