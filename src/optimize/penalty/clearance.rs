@@ -103,6 +103,48 @@ pub struct ByPose {
     pub heading: f64,
 }
 
+/// A contour point and the body that it is on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct PointOf {
+    pub body: usize,
+    pub point: usize,
+}
+
+/// A contour point near an obstacle.
+pub(crate) struct Touch<'a> {
+    pub of: PointOf,
+    /// By how much it misses the wanted clearance, m.
+    pub short: f64,
+    /// Derivatives of `short` by the pose, and by the joints.
+    pub by_pose: ByPose,
+    pub by_joints: &'a [f64],
+}
+
+/// What moves a point whose missing clearance grows along `push`.
+fn pushed<'a>(
+    robot: &RobotModel,
+    frames: &[BodyFrame],
+    of: PointOf,
+    arm: Vector3<f64>,
+    short: f64,
+    push: Vector3<f64>,
+    by_joints: &'a mut [f64],
+) -> Touch<'a> {
+    by_joints.fill(0.0);
+    let mut link = of.body;
+    while link != 0 {
+        let (frame, body) = (&frames[link], &robot.bodies[link]);
+        if let Some(motion) = &body.motion {
+            let axis = frame.rotation * motion.axis.into_inner();
+            let felt = if motion.prismatic { axis.dot(&push) } else { axis.dot(&(arm - frame.origin).cross(&push)) };
+            by_joints[motion.joint] += motion.multiplier * felt;
+        }
+        link = body.parent;
+    }
+    let by_pose = ByPose { position: [push.x, push.y], heading: arm.x * push.y - arm.y * push.x };
+    Touch { of, short, by_pose, by_joints }
+}
+
 impl ClearancePenalty {
     /// For `contour` of `robot`, wanting `clearance` m in a field with cells of `cell` m; violations count in units of `scale` m.
     pub fn new(contour: Contour, robot: &RobotModel, clearance: f64, scale: f64, cell: f64) -> Self {
@@ -197,7 +239,7 @@ impl ClearancePenalty {
         self.loads.fill(Load::none());
         let (scale, mut sum, mut touched) = (self.scale, 0.0, false);
         let mut loads = std::mem::take(&mut self.loads);
-        self.scan(field, at.position, sample, |body, arm, short, gradient| {
+        self.scan(field, at.position, sample, |PointOf { body, .. }, arm, short, gradient| {
             let (cost, slope) = judge.weigh(short / scale);
             sum += cost;
             if slope != 0.0 {
@@ -215,14 +257,14 @@ impl ClearancePenalty {
     }
 
     /// Tells `touch` of every contour point that misses the wanted clearance at a place that is a step of `sample` away from where
-    /// it was last: by how much (m, above 0), and that amount's derivatives by x, y, heading and joints.
+    /// it was last.
     pub(crate) fn visit(
         &mut self,
         robot: &RobotModel,
         field: &impl DistanceField,
         at: Placement<'_>,
         sample: usize,
-        mut touch: impl FnMut(f64, &ByPose, &[f64]),
+        mut touch: impl FnMut(Touch<'_>),
     ) {
         if !self.moved(at, sample) {
             return;
@@ -230,27 +272,34 @@ impl ClearancePenalty {
         self.place(robot, at.heading, at.joints);
         let mut by_joints = std::mem::take(&mut self.by_joints);
         let frames = std::mem::take(&mut self.frames);
-        self.scan_in(&frames, field, at.position, sample, |body, arm, short, gradient| {
-            if short <= 0.0 {
-                return;
+        self.scan_in(&frames, field, at.position, sample, |point, arm, short, gradient| {
+            if short > 0.0 {
+                touch(pushed(robot, &frames, point, arm, short, -gradient, &mut by_joints));
             }
-            let push = -gradient;
-            by_joints.fill(0.0);
-            let mut link = body;
-            while link != 0 {
-                let (frame, moves) = (&frames[link], &robot.bodies[link]);
-                if let Some(motion) = &moves.motion {
-                    let axis = frame.rotation * motion.axis.into_inner();
-                    let felt =
-                        if motion.prismatic { axis.dot(&push) } else { axis.dot(&(arm - frame.origin).cross(&push)) };
-                    by_joints[motion.joint] += motion.multiplier * felt;
-                }
-                link = moves.parent;
-            }
-            let by_pose = ByPose { position: [push.x, push.y], heading: arm.x * push.y - arm.y * push.x };
-            touch(short, &by_pose, &by_joints);
         });
         self.frames = frames;
+        self.by_joints = by_joints;
+    }
+
+    /// Tells `touch` of some points, whether or not they miss the clearance.
+    pub(crate) fn look(
+        &mut self,
+        robot: &RobotModel,
+        field: &impl DistanceField,
+        at: Placement<'_>,
+        points: &[PointOf],
+        mut touch: impl FnMut(Touch<'_>),
+    ) {
+        self.place(robot, at.heading, at.joints);
+        let mut by_joints = std::mem::take(&mut self.by_joints);
+        let base = Vector3::new(at.position[0], at.position[1], 0.0);
+        for &of in points {
+            let (frame, point) = (&self.frames[of.body], &self.contour.points[of.point]);
+            let arm = frame.rotation * point.at.coords + frame.origin;
+            let (distance, gradient) = field.distance_gradient((arm + base).into());
+            let short = self.clearance + point.radius - distance;
+            touch(pushed(robot, &self.frames, of, arm, short, -Vector3::from(gradient), &mut by_joints));
+        }
         self.by_joints = by_joints;
     }
 
@@ -259,14 +308,14 @@ impl ClearancePenalty {
         field: &impl DistanceField,
         position: [f64; 2],
         sample: usize,
-        point: impl FnMut(usize, Vector3<f64>, f64, Vector3<f64>),
+        point: impl FnMut(PointOf, Vector3<f64>, f64, Vector3<f64>),
     ) {
         let frames = std::mem::take(&mut self.frames);
         self.scan_in(&frames, field, position, sample, point);
         self.frames = frames;
     }
 
-    /// Looks at every point that may miss the clearance: its body, where it is from the base's origin (map axes), by how much it
+    /// Looks at every point that may miss the clearance: which, where it is from the base's origin (map axes), by how much it
     /// misses (m), and the field's gradient there. Notes how far each shape may move before that has to be done again.
     fn scan_in(
         &mut self,
@@ -274,7 +323,7 @@ impl ClearancePenalty {
         field: &impl DistanceField,
         position: [f64; 2],
         sample: usize,
-        mut look: impl FnMut(usize, Vector3<f64>, f64, Vector3<f64>),
+        mut look: impl FnMut(PointOf, Vector3<f64>, f64, Vector3<f64>),
     ) {
         let stride = self.stride();
         let free = &mut self.memory[sample * stride + 4 + self.joints..(sample + 1) * stride];
@@ -300,12 +349,13 @@ impl ClearancePenalty {
                 if !patch.leaf {
                     continue;
                 }
-                for point in &self.contour.points[patch.first..patch.last] {
+                for index in patch.first..patch.last {
+                    let point = &self.contour.points[index];
                     let arm = placed(&point.at);
                     let (distance, gradient) = field.distance_gradient((arm + base).into());
                     let short = self.clearance + point.radius - distance;
                     *free = free.min(-short / INTERPOLATION_SLOPE);
-                    look(shape.body, arm, short, Vector3::from(gradient));
+                    look(PointOf { body: shape.body, point: index }, arm, short, Vector3::from(gradient));
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! First guess of a steered motion: nodes along the search's path, corners rounded where the base can drive through them.
 
 use super::hermite::ORDERS;
-use super::problem::Layout;
+use super::layout::Layout;
 use crate::optimize::initial::trapezoid;
 use crate::optimize::penalty::Limits;
 use crate::search::{SearchMove, SearchPath};

@@ -3,6 +3,9 @@
 
 mod guess;
 mod hermite;
+mod integral;
+mod layout;
+mod local;
 mod problem;
 mod solver;
 
@@ -16,7 +19,8 @@ use crate::search::SearchPath;
 use crate::trajectory::{Ending, Leg, OptimiserOutcome, SteerLeg, StillLeg, Trajectory, TrajectorySource};
 
 use guess::guess;
-use problem::{Layout, Problem, Weights};
+use layout::Layout;
+use problem::{Problem, Weights};
 use solver::{SolverOptions, solve};
 
 pub fn env(name: &str, default: f64) -> f64 {
@@ -52,8 +56,16 @@ pub fn optimize_steered<F: DistanceField>(
         clearance_unit: 0.05,
     };
     let layout = first.layout;
+    let counts: Vec<usize> = (0..layout.pieces)
+        .map(|k| {
+            let length = (first.x[layout.state(k + 1, 1, 0)] - first.x[layout.state(k, 1, 0)]).abs();
+            let time = first.x[layout.duration(k)].exp();
+            let count = (length / env("DL", 0.1)).max(time / env("DT", 0.15));
+            2 * (0.5 * count.clamp(4.0, 20.0)).ceil() as usize
+        })
+        .collect();
     let mut problem =
-        Problem::new(robot, field, clearance, first.directions, first.fixed, env("SAMPLES", 10.0) as usize, weights);
+        Problem::new(robot, field, clearance, first.directions, first.fixed, &counts, weights);
     let mut x = first.x;
     let options = SolverOptions {
         max_iterations: env("ITER", 100.0) as usize,

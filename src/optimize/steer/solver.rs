@@ -2,9 +2,10 @@
 //!
 //! A step minimises the Gauss-Newton model of the costs plus a stiff square of the linearised gaps, so it is that of sequential
 //! quadratic programming with multipliers (J. Nocedal, S. Wright, *Numerical Optimization*, 2nd ed., sections 17.3, 18.3). It is
-//! judged by the augmented Lagrangian with the multipliers that the step itself gives.
+//! judged by the augmented Lagrangian with the multipliers that the step itself gives. The model does not know limits that are
+//! still kept; where a step has pushed contour points into obstacles, it is made again with those points in the model.
 
-use super::problem::{Derivatives, Problem, STIFFNESS};
+use super::problem::{Contact, Derivatives, Problem, Row, STIFFNESS};
 use crate::math::banded::Banded;
 use crate::optimize::penalty::clearance::DistanceField;
 
@@ -23,133 +24,250 @@ pub(super) struct SolverOptions {
 pub(super) struct Solved {
     pub cost: f64,
     pub iterations: usize,
-    pub evaluations: usize,
     pub converged: bool,
-    /// Largest gap between pieces, m.
-    pub gap: f64,
 }
 
 /// Price of a squared gap in the merit, s/m^2.
 const GAP_PRICE: f64 = 200.0;
+/// Damping at first; it follows how well the model predicts.
+const FIRST_DAMPING: f64 = 0.3;
+/// Contour points a sample that a step made again looks at.
+const POINTS: usize = 3;
+/// The iteration ends where a step lowers the merit little and leaves gaps below this, m.
+const SMALL_GAP: f64 = 1e-4;
+
+struct Workspace {
+    here: Derivatives,
+    there: Derivatives,
+    factor: Banded,
+    step: Vec<f64>,
+    gradient: Vec<f64>,
+    product: Vec<f64>,
+    trial: Vec<f64>,
+    natural: Vec<f64>,
+    multipliers: Vec<[f64; 2]>,
+    next_multipliers: Vec<[f64; 2]>,
+}
+
+/// A step's merit: here, as the model predicts, as it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Merit {
+    here: f64,
+    predicted: f64,
+    there: f64,
+    /// Cost there.
+    cost: f64,
+}
 
 /// Improves `x`.
 pub(super) fn solve<F: DistanceField>(problem: &mut Problem<'_, F>, x: &mut [f64], options: &SolverOptions) -> Solved {
     let layout = problem.layout;
-    let (mut here, mut there) = (Derivatives::new(layout), Derivatives::new(layout));
-    let mut factor = here.hessian.clone();
-    let (mut step, mut trial, mut product) = (x.to_vec(), x.to_vec(), x.to_vec());
-    let mut damping = crate::optimize::steer::env("DAMP", 0.3);
-    let price = crate::optimize::steer::env("PRICE", GAP_PRICE);
-    let mut cost = problem.evaluate(x, &mut here);
-    let mut solved = Solved { cost, iterations: 0, evaluations: 1, converged: false, gap: f64::INFINITY };
-    let natural = problem.natural();
-    let mut flat = 0;
-    let mut multipliers = problem.multipliers.clone();
+    let here = Derivatives::new(layout);
+    let mut work = Workspace {
+        factor: here.hessian.clone(),
+        there: here.clone(),
+        here,
+        step: x.to_vec(),
+        gradient: x.to_vec(),
+        product: x.to_vec(),
+        trial: x.to_vec(),
+        natural: problem.natural(),
+        multipliers: vec![[0.0; 2]; layout.pieces],
+        next_multipliers: vec![[0.0; 2]; layout.pieces],
+    };
+    let mut damping = crate::optimize::steer::env("DAMP", FIRST_DAMPING);
+    let mut cost = problem.evaluate(x, &work.multipliers, &mut work.here);
+    let mut solved = Solved { cost, iterations: 0, converged: false };
+    let trace = std::env::var("TRACE").is_ok();
     while solved.iterations < options.max_iterations {
-        solved.iterations += 1;
-        let mut found = false;
-        let mut hopeless = false;
-        if damped(&here, &natural, damping, &mut factor) {
-            for (s, g) in step.iter_mut().zip(&here.gradient) {
-                *s = -g;
+        let mut rows: Vec<Row> = Vec::new();
+        let mut merit = None;
+        // The second time with the contour points that the first has pushed into obstacles.
+        for attempt in 0..crate::optimize::steer::env("ATT", 2.0) as usize {
+            solved.iterations += 1;
+            merit = work.attempt(problem, x, cost, damping, &rows);
+            let Some(found) = &merit else { break };
+            if trace {
+                eprintln!("  it {} att {attempt} rows {} merit {:.5} -> {:.5} pred {:.2e} damp {:.1e} gap {:.1e}", solved.iterations, rows.len(), found.here, found.there, found.here - found.predicted, damping, largest(&work.there.gaps));
             }
-            factor.solve(&mut step);
-            here.hessian.multiply(&step, &mut product);
-            for ((t, x), s) in trial.iter_mut().zip(x.iter()).zip(&step) {
-                *t = x + s;
-            }
-            let closed = problem.linear_gaps(x, &step);
-            // Model and merit before and after, gaps apart.
-            let (mut model, mut merit_here, mut merit_model) = (0.0, cost, cost);
-            for ((s, g), h) in step.iter().zip(&here.gradient).zip(&product) {
-                model += s * (g + 0.5 * h);
-            }
-            for (piece, (gap, change)) in here.gaps.iter().zip(&closed).enumerate() {
-                for axis in 0..2 {
-                    let (c, d) = (gap[axis], change[axis]);
-                    let old = problem.multipliers[piece][axis];
-                    model -= d * (old + STIFFNESS * c) + 0.5 * STIFFNESS * d * d;
-                    let new = old + STIFFNESS * (c + d);
-                    multipliers[piece][axis] = new;
-                    merit_here += new * c + 0.5 * price * c * c;
-                    merit_model += new * (c + d) + 0.5 * price * (c + d) * (c + d);
-                }
-            }
-            merit_model += model;
-            let predicted = merit_here - merit_model;
-            let reached = problem.evaluate_with(&trial, &mut there, &multipliers);
-            solved.evaluations += 1;
-            let mut merit_there = reached;
-            for (gap, new) in there.gaps.iter().zip(&multipliers) {
-                for axis in 0..2 {
-                    merit_there += new[axis] * gap[axis] + 0.5 * price * gap[axis] * gap[axis];
-                }
-            }
-            let decrease = merit_here - merit_there;
-            hopeless = predicted <= 1e-9 * cost;
-            found = merit_there.is_finite() && decrease > 1e-4 * predicted && predicted > 0.0;
-            if found {
-                let ratio = decrease / predicted;
-                damping *= if ratio > 0.75 { 0.2 } else if ratio < 0.25 { 3.0 } else { 0.6 };
-                damping = damping.max(1e-9);
-                x.copy_from_slice(&trial);
-                std::mem::swap(&mut here, &mut there);
-                problem.multipliers.copy_from_slice(&multipliers);
-                let gap = largest(&here.gaps);
-                flat = if decrease <= options.tolerance * reached.abs() && gap <= options.gap_tolerance.max(1e-4) { flat + 1 } else { 0 };
-                cost = reached;
-                if std::env::var("TRACE").is_ok() {
-                    eprintln!("  it {} cost {:.4} merit {:.5}->{:.5} pred {:.2e} ratio {:.2} gap {:.1e} damp {:.1e}", solved.iterations, cost, merit_here, merit_there, predicted, ratio, gap, damping);
-                }
-            } else if std::env::var("TRACE").is_ok() {
-                eprintln!("  it {} REJECT merit {:.5}->{:.5} pred {:.2e} damp {:.1e}", solved.iterations, merit_here, merit_there, predicted, damping);
-            }
-        }
-        if !found {
-            damping *= 8.0;
-            if damping > 1e8 || hopeless {
-                solved.converged = hopeless;
+            if found.accepted() {
                 break;
             }
+            let contacts = deepest(&problem.contacts);
+            if contacts.is_empty() {
+                break;
+            }
+            rows.extend(problem.rows(x, &contacts));
         }
-        if flat >= 1 {
-            solved.converged = true;
-            break;
+        match merit.filter(Merit::accepted) {
+            Some(merit) => {
+                let ratio = (merit.here - merit.there) / (merit.here - merit.predicted);
+                damping *= match ratio {
+                    r if r > 0.75 => crate::optimize::steer::env("DEC", 0.2),
+                    r if r < 0.25 => 3.0,
+                    _ => 0.6,
+                };
+                damping = damping.max(1e-9);
+                x.copy_from_slice(&work.trial);
+                std::mem::swap(&mut work.here, &mut work.there);
+                std::mem::swap(&mut work.multipliers, &mut work.next_multipliers);
+                cost = merit.cost;
+                if merit.here - merit.there <= options.tolerance * cost.abs() && largest(&work.here.gaps) <= SMALL_GAP {
+                    solved.converged = true;
+                    break;
+                }
+            }
+            None => {
+                damping *= crate::optimize::steer::env("INC", 8.0);
+                let hopeless = merit.is_some_and(|m| (m.here - m.predicted).abs() <= 1e-9 * cost.abs());
+                if damping > 1e8 || hopeless {
+                    solved.converged = hopeless;
+                    break;
+                }
+            }
         }
     }
-    // What is left of the gaps is closed by steps that look at nothing else.
-    for _ in 0..4 {
-        solved.gap = largest(&here.gaps);
-        if solved.gap <= options.gap_tolerance {
-            break;
-        }
-        if !damped(&here, &natural, 1e-3, &mut factor) {
-            break;
-        }
-        let multipliers = vec![[0.0; 2]; here.gaps.len()];
-        problem.gap_gradient(x, &here.gaps, &mut step);
-        step.iter_mut().for_each(|s| *s = -*s);
-        factor.solve(&mut step);
-        x.iter_mut().zip(&step).for_each(|(x, s)| *x += s);
-        cost = problem.evaluate_with(x, &mut here, &multipliers);
-        solved.evaluations += 1;
-    }
-    solved.gap = largest(&here.gaps);
-    solved.cost = cost;
+    solved.cost = work.close_gaps(problem, x, cost, options.gap_tolerance);
     solved
 }
 
-fn largest(gaps: &[[f64; 2]]) -> f64 {
-    gaps.iter().flatten().fold(0.0f64, |m, g| m.max(g.abs()))
+impl Merit {
+    fn accepted(&self) -> bool {
+        let predicted = self.here - self.predicted;
+        self.there.is_finite() && predicted > 0.0 && self.here - self.there > 1e-4 * predicted
+    }
 }
 
-/// The Hessian with its diagonal grown: by what a natural step of each unknown is, and by the costs' share of it; factored.
-fn damped(at: &Derivatives, natural: &[f64], damping: f64, factor: &mut Banded) -> bool {
-    factor.copy_from(&at.hessian);
-    let share = crate::optimize::steer::env("SHARE", 0.1);
-    for (i, natural) in natural.iter().enumerate() {
-        let diagonal = (at.hessian.diagonal(i) - at.stiff[i]).max(0.0);
-        *factor.entry(i, i) += damping * (share * diagonal + natural);
+impl Workspace {
+    /// A step from `x` to `trial`; `None` where the model has no minimum.
+    fn attempt<F: DistanceField>(
+        &mut self,
+        problem: &mut Problem<'_, F>,
+        x: &[f64],
+        cost: f64,
+        damping: f64,
+        rows: &[Row],
+    ) -> Option<Merit> {
+        let mut taken: Vec<bool> = rows.iter().map(|row| problem.after(row, &self.step) > 0.0 && row.value < 0.0).collect();
+        loop {
+            self.factor.copy_from(&self.here.hessian);
+            self.gradient.copy_from_slice(&self.here.gradient);
+            for (i, natural) in self.natural.iter().enumerate() {
+                let diagonal = (self.here.hessian.diagonal(i) - self.here.stiff[i]).max(0.0);
+                *self.factor.entry(i, i) += damping * (natural + DIAGONAL_SHARE * diagonal);
+            }
+            for (row, _) in rows.iter().zip(&taken).filter(|(_, taken)| **taken) {
+                problem.add_row(row, &mut self.gradient, &mut self.factor);
+            }
+            if !self.factor.factor() {
+                return None;
+            }
+            for (step, gradient) in self.step.iter_mut().zip(&self.gradient) {
+                *step = -gradient;
+            }
+            self.factor.solve(&mut self.step);
+            let mut more = false;
+            for (row, taken) in rows.iter().zip(&mut taken) {
+                if !*taken && row.value < 0.0 && problem.after(row, &self.step) > 0.0 {
+                    *taken = true;
+                    more = true;
+                }
+            }
+            if !more {
+                break;
+            }
+        }
+        for ((trial, x), step) in self.trial.iter_mut().zip(x).zip(&self.step) {
+            *trial = x + step;
+        }
+        // The model without damping and gaps.
+        self.here.hessian.multiply(&self.step, &mut self.product);
+        let mut merit = Merit { here: cost, predicted: cost, there: 0.0, cost: 0.0 };
+        for ((step, gradient), product) in self.step.iter().zip(&self.here.gradient).zip(&self.product) {
+            merit.predicted += step * (gradient + 0.5 * product);
+        }
+        for (row, _) in rows.iter().zip(&taken).filter(|(_, taken)| **taken) {
+            let after = problem.after(row, &self.step).max(0.0);
+            merit.predicted += 0.5 * row.weight * after * after;
+        }
+        let jacobians = problem.gap_jacobians(x);
+        for (piece, by) in jacobians.iter().enumerate() {
+            for axis in 0..2 {
+                let gap = self.here.gaps[piece][axis];
+                let change = problem.along(piece, &by[axis], &self.step);
+                let old = self.multipliers[piece][axis];
+                merit.predicted -= change * (old + STIFFNESS * gap) + 0.5 * STIFFNESS * change * change;
+                let new = old + STIFFNESS * (gap + change);
+                self.next_multipliers[piece][axis] = new;
+                merit.here += price(new, gap);
+                merit.predicted += price(new, gap + change);
+            }
+        }
+        merit.cost = problem.evaluate(&self.trial, &self.next_multipliers, &mut self.there);
+        merit.there = merit.cost;
+        for (gap, multiplier) in self.there.gaps.iter().zip(&self.next_multipliers) {
+            merit.there += price(multiplier[0], gap[0]) + price(multiplier[1], gap[1]);
+        }
+        Some(merit)
     }
-    factor.factor()
+
+    /// Closes what is left of the gaps by steps that look at nothing else. Returns the cost.
+    fn close_gaps<F: DistanceField>(
+        &mut self,
+        problem: &mut Problem<'_, F>,
+        x: &mut [f64],
+        mut cost: f64,
+        tolerance: f64,
+    ) -> f64 {
+        let none = vec![[0.0; 2]; self.multipliers.len()];
+        for _ in 0..6 {
+            if largest(&self.here.gaps) <= tolerance {
+                break;
+            }
+            self.factor.copy_from(&self.here.hessian);
+            for (i, natural) in self.natural.iter().enumerate() {
+                *self.factor.entry(i, i) += 1e-3 * natural;
+            }
+            if !self.factor.factor() {
+                break;
+            }
+            self.step.fill(0.0);
+            for (piece, by) in problem.gap_jacobians(x).iter().enumerate() {
+                for axis in 0..2 {
+                    let row = Row { piece, weight: STIFFNESS, value: self.here.gaps[piece][axis], by: by[axis].clone() };
+                    problem.pull(&row, &mut self.step);
+                }
+            }
+            self.factor.solve(&mut self.step);
+            x.iter_mut().zip(&self.step).for_each(|(x, step)| *x += step);
+            cost = problem.evaluate(x, &none, &mut self.here);
+        }
+        cost
+    }
+}
+
+/// Share of the costs' own curvature in the damping.
+const DIAGONAL_SHARE: f64 = 0.01;
+
+fn price(multiplier: f64, gap: f64) -> f64 {
+    gap * (multiplier + 0.5 * GAP_PRICE * gap)
+}
+
+fn largest(gaps: &[[f64; 2]]) -> f64 {
+    gaps.iter().flatten().fold(0.0f64, |most, gap| most.max(gap.abs()))
+}
+
+/// Of each sample the points that are deepest in.
+fn deepest(contacts: &[Contact]) -> Vec<Contact> {
+    let mut found: Vec<Contact> = Vec::new();
+    let mut first = 0;
+    while first < contacts.len() {
+        let key = (contacts[first].piece, contacts[first].sample);
+        let last = first + contacts[first..].iter().take_while(|c| (c.piece, c.sample) == key).count();
+        let mut own = contacts[first..last].to_vec();
+        own.sort_by(|a, b| b.short.total_cmp(&a.short));
+        found.extend(own.into_iter().take(POINTS));
+        first = last;
+    }
+    found
 }
