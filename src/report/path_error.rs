@@ -13,6 +13,9 @@ const STEP: f64 = 1e-3;
 /// Cells of the look-up grid at most, and their least size, m.
 const GRID: (f64, f64) = (1e6, 5e-3);
 
+/// A step along the path that changes no distance that anyone reads, m.
+const NO_STEP: f64 = 1e-11;
+
 /// One row of `path_error.csv`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathErrorRow {
@@ -232,10 +235,15 @@ impl PathReference {
             }
             Course::Steered(steered) => {
                 let [low, own, high] = self.bracket(nearest, |place| steered.curve.parameter(place));
-                let jets = |u: f64| steered.curve.point_jet(steered.curve.place(u));
-                // The vertex may be a corner, so each side is a curve of its own.
-                let side = |from: f64, to: f64| distance_to_curve(jets, [from, 0.5 * (from + to), to], point);
-                near.min(side(low, own)).min(side(own, high))
+                let curve = &steered.curve;
+                if steered.turns_or_stands([low, own, high]) {
+                    // The vertex may be a corner: each side is a curve of its own.
+                    let jets = |u: f64| curve.point_jet(curve.place(u));
+                    let side = |from: f64, to: f64| distance_to_curve(jets, [from, 0.5 * (from + to), to], point);
+                    return near.min(side(low, own)).min(side(own, high));
+                }
+                let jets = |u: f64| curve.point_jet_from(vertex.place, vertex.point, curve.place(u));
+                near.min(distance_to_curve(jets, [low, own, high], point))
             }
             Course::Proportional(p) if p.drive != 0.0 => {
                 let (sin, cos) = p.pose.yaw.sin_cos();
@@ -301,6 +309,7 @@ fn distance_to_curve(
     point: [f64; 2],
 ) -> f64 {
     let mut best = f64::INFINITY;
+    let mut seen = [false; 2];
     for _ in 0..40 {
         let [x, y] = jets(u);
         let offset = [x[0] - point[0], y[0] - point[1]];
@@ -308,17 +317,23 @@ fn distance_to_curve(
         let slope = offset[0] * x[1] + offset[1] * y[1];
         let bend = x[1] * x[1] + y[1] * y[1] + offset[0] * x[2] + offset[1] * y[2];
         if slope > 0.0 {
-            high = u;
+            (high, seen[1]) = (u, true);
         } else {
-            low = u;
+            (low, seen[0]) = (u, true);
         }
         let newton = u - slope / bend;
-        let next = if bend > 0.0 && newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        // Beyond an end where nobody was yet, the foot may be that end.
+        let next = match bend > 0.0 {
+            true if newton > low && newton < high => newton,
+            true if newton <= low && !seen[0] => low,
+            true if newton >= high && !seen[1] => high,
+            _ => 0.5 * (low + high),
+        };
         let step = next - u;
         u = next;
-        // What is left changes the distance by the square of the step, over the distance.
+        // What is left changes the distance by the square of the step, over the distance, and by no more than the step.
         let speed = x[1] * x[1] + y[1] * y[1];
-        if step * step * speed <= 1e-9 * best * best || step == 0.0 {
+        if step * step * speed <= (1e-9 * best * best).max(NO_STEP * NO_STEP) || step == 0.0 {
             break;
         }
     }

@@ -139,6 +139,15 @@ impl Steered {
         [first, second, (sign * travelled[2] - 3.0 * g1 * first * second - g2 * first * first * first) / g]
     }
 
+    /// Whether the path between the first and the last of three parameters is no smooth and nearly straight line: it turns by more than
+    /// 0.1 rad, changes its direction, or stands at the one in the middle.
+    pub fn turns_or_stands(&self, parameters: [f64; 3]) -> bool {
+        let places = parameters.map(|u| self.curve.place(u));
+        let [before, at, after] = places.map(|place| self.curve.jet(1, place)[1]);
+        let turn = self.curve.jet(0, places[2])[0] - self.curve.jet(0, places[0])[0];
+        turn.abs() > 0.1 || before * after < 0.0 || at.abs() <= 1e-6 * before.abs().max(after.abs())
+    }
+
     /// Largest |curvature| between the rests, 1/m.
     fn largest_curvature(&self) -> f64 {
         let curve = &self.curve;

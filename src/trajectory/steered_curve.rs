@@ -19,6 +19,10 @@ const AT_REST: f64 = 1e-3;
 /// Below this share of the greatest |s'| the base stands.
 const STANDS: f64 = 1e-9;
 
+/// Nodes and weights of Gauss-Legendre quadrature with three points on [-1, 1].
+const GAUSS: [(f64, f64); 3] =
+    [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
+
 /// Dimension of the heading.
 const HEADING: usize = 0;
 /// Dimension of the arc length.
@@ -208,9 +212,29 @@ impl SteeredCurve {
     /// Position with its first two derivatives by the parameter, x and y.
     pub fn point_jet(&self, place: Place) -> [[f64; 3]; 2] {
         let pose = self.pose(place);
-        let (sin, cos) = pose.yaw.sin_cos();
-        let ([_, turn, ..], [_, speed, rise, _]) = (self.jet(HEADING, place), self.jet(ADVANCE, place));
-        [[pose.x, speed * cos, rise * cos - speed * turn * sin], [pose.y, speed * sin, rise * sin + speed * turn * cos]]
+        self.with_derivatives([pose.x, pose.y], place)
+    }
+
+    /// [`Self::point_jet`] from a place nearby whose position is known: with a third of the work, where the heading turns by no more
+    /// than a tenth of a radian in between.
+    pub fn point_jet_from(&self, known: Place, point: [f64; 2], place: Place) -> [[f64; 3]; 2] {
+        if known.piece != place.piece {
+            return self.point_jet(place);
+        }
+        let coefficients = &self.poly.pieces[place.piece].coefficients;
+        let (middle, half) = (0.5 * (known.u + place.u), 0.5 * (place.u - known.u));
+        let mut at = point;
+        for (node, weight) in GAUSS {
+            let velocity = velocity(&coefficients[HEADING], &coefficients[ADVANCE], middle + half * node);
+            at = [at[0] + half * weight * velocity[0], at[1] + half * weight * velocity[1]];
+        }
+        self.with_derivatives(at, place)
+    }
+
+    fn with_derivatives(&self, [x, y]: [f64; 2], place: Place) -> [[f64; 3]; 2] {
+        let ([yaw, turn, ..], [_, speed, rise, _]) = (self.jet(HEADING, place), self.jet(ADVANCE, place));
+        let (sin, cos) = yaw.sin_cos();
+        [[x, speed * cos, rise * cos - speed * turn * sin], [y, speed * sin, rise * sin + speed * turn * cos]]
     }
 
     /// Distance driven up to a place, back and forth counted both, m.

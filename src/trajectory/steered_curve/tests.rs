@@ -132,6 +132,22 @@ fn derivatives_of_the_position_are_its_differences() {
 }
 
 #[test]
+fn a_position_from_one_nearby_is_that_from_the_start() {
+    let wild = curve(&wild());
+    for t in [0.2, 0.9, 1.6, 1.998, 2.4, 3.3] {
+        let known = wild.place(t);
+        let [x, y] = wild.point_jet(known).map(|axis| axis[0]);
+        for step in [-4e-3, -1e-3, 0.0, 3e-3] {
+            let place = wild.place(t + step);
+            let (near, far) = (wild.point_jet_from(known, [x, y], place), wild.point_jet(place));
+            for (near, far) in near.iter().flatten().zip(far.iter().flatten()) {
+                assert!((near - far).abs() < 1e-13, "{near} is not {far} at {t} + {step}");
+            }
+        }
+    }
+}
+
+#[test]
 fn the_distance_driven_is_inverted_and_counts_both_directions() {
     let wild = curve(&wild());
     // Steps of 1/60000 s: the join at 2 s lies between two of them.
