@@ -1,6 +1,7 @@
 //! What can be set, with defaults that suit rooms and robots of about half a metre.
 
 use super::objective::Weights;
+use super::steer::SteerOptions;
 use crate::math::lbfgs::LbfgsOptions;
 use crate::mission::Parameterisation;
 
@@ -9,6 +10,8 @@ use crate::mission::Parameterisation;
 pub struct OptimizeOptions {
     /// What the polynomials are of. Default [`Parameterisation::DEFAULT`].
     pub parameterisation: Parameterisation,
+    /// How heading and arc length are optimised; the other options below are of the flat parameterisation.
+    pub steer: SteerOptions,
     /// Clearance to aim at, m: what must be certified plus a margin for what sampling misses. Default 0.05.
     pub clearance: f64,
     /// A leg that ends with less than `clearance - clearance_tolerance` (m) at its contour points is cut, and the robot stops where
@@ -61,6 +64,7 @@ impl Default for OptimizeOptions {
     fn default() -> Self {
         Self {
             parameterisation: Parameterisation::DEFAULT,
+            steer: SteerOptions::default(),
             clearance: 0.05,
             clearance_tolerance: 0.02,
             dense: true,

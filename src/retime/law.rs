@@ -51,14 +51,20 @@ pub fn time_leg(course: &Course, law: TimeLaw, task: Task<'_>) -> Result<TimedLe
             let mut best: Option<TimedLeg> = None;
             for law in [TimeLaw::Optimal, TimeLaw::Minco, TimeLaw::Eq5, TimeLaw::FixedPoint] {
                 let Ok(leg) = time_leg(course, law, task) else { continue };
-                if std::env::var("DBG").is_ok() { eprint!("{law:?} {:.4}; ", leg.duration()); }
+                if std::env::var("DBG").is_ok() {
+                    eprint!("{law:?} {:.4}; ", leg.duration());
+                }
                 let leg = if law == TimeLaw::Optimal { leg } else { guarded(TimedLeg { stretch: 1.0, ..leg }, task) };
-                if std::env::var("DBG").is_ok() { eprint!("guarded {:.4}; ", leg.duration()); }
+                if std::env::var("DBG").is_ok() {
+                    eprint!("guarded {:.4}; ", leg.duration());
+                }
                 if best.as_ref().is_none_or(|best| leg.duration() < best.duration()) {
                     best = Some(leg);
                 }
             }
-            if std::env::var("DBG").is_ok() { eprintln!(); }
+            if std::env::var("DBG").is_ok() {
+                eprintln!();
+            }
             Ok(best.expect("fixed_point times every curve"))
         }
         TimeLaw::FixedPoint => {
@@ -306,7 +312,15 @@ pub(super) fn guarded(leg: TimedLeg, task: Task<'_>) -> TimedLeg {
     let stretch = slow_down(&found, &limits(task.robot, Scope::Everything), task.hold);
     if std::env::var("DBG").is_ok() && leg.law == Some(TimeLaw::Optimal) {
         let l = limits(task.robot, Scope::Everything);
-        eprintln!("stretch {stretch:.5} {:?}", found.rates.iter().zip(&l).map(|(r, l)| [0, 1, 2].map(|k| (1e4 * r[k] / l[k].unwrap_or(1e9)).round() / 1e4)).collect::<Vec<_>>());
+        eprintln!(
+            "stretch {stretch:.5} {:?}",
+            found
+                .rates
+                .iter()
+                .zip(&l)
+                .map(|(r, l)| [0, 1, 2].map(|k| (1e4 * r[k] / l[k].unwrap_or(1e9)).round() / 1e4))
+                .collect::<Vec<_>>()
+        );
     }
     let centre = found.rates[found.rates.len() - 3][0];
     TimedLeg { stretch, speed_limit: centre / stretch, ..leg }

@@ -39,6 +39,8 @@ pub struct Problem<'a> {
 pub fn fastest(problem: &Problem<'_>, mut rates: impl FnMut(f64, &mut Vec<[f64; 3]>)) -> Option<Pace> {
     let grid = Grid::new(problem, &mut rates)?;
     let solution = barrier::solve(problem, &grid)?;
-    if std::env::var("DBG").is_ok() { eprintln!("cells {} steps {}", grid.cells(), solution.steps); }
+    if std::env::var("DBG").is_ok() {
+        eprintln!("cells {} steps {}", grid.cells(), solution.steps);
+    }
     Some(Pace::new(&grid.knots, solution.cells.into_iter()))
 }

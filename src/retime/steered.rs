@@ -13,7 +13,7 @@ use crate::trajectory::steered_curve::SteeredCurve;
 use super::RetimeError;
 use super::convolution::Convolution;
 use super::course::{Course, Proportional, STRAIGHT, compose};
-use super::law::{guarded, paced, LEAST_SPEED, Task, centre_limits, slowed};
+use super::law::{LEAST_SPEED, Task, centre_limits, guarded, paced, slowed};
 use super::peaks::peaks;
 use super::timed_leg::{Clock, TimedLeg};
 
@@ -172,7 +172,9 @@ pub(super) fn time_steered(steered: &Steered, law: TimeLaw, task: Task<'_>) -> R
         TimeLaw::Auto => {
             let best = guarded(TimedLeg { stretch: 1.0, ..own(steered, task) }, task);
             let least = time_steered(steered, TimeLaw::Optimal, task);
-            if std::env::var("DBG").is_ok() { eprintln!("own {:.3} optimal {:?}", best.duration(), least.as_ref().map(|l| l.duration())); }
+            if std::env::var("DBG").is_ok() {
+                eprintln!("own {:.3} optimal {:?}", best.duration(), least.as_ref().map(|l| l.duration()));
+            }
             Ok(least.ok().filter(|leg| leg.duration() < best.duration()).unwrap_or(best))
         }
         TimeLaw::Minco => Ok(own(steered, task)),

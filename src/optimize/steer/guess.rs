@@ -149,7 +149,6 @@ fn kept(corner: &Corner) -> Vec<usize> {
 
 /// The guess for a path; `None` where nothing moves.
 pub(super) fn guess(path: &SearchPath, limits: &Limits) -> Option<Guess> {
-    let longest = super::env("LONGEST", LONGEST);
     let (corners, straights) = take_apart(path);
     let ramp = 0.5 * limits.speed * limits.speed / limits.acceleration;
     let mut nodes: Vec<Node> = Vec::new();
@@ -240,34 +239,37 @@ pub(super) fn guess(path: &SearchPath, limits: &Limits) -> Option<Guess> {
         }
         let leaving = (heading - nodes[nodes.len() - 1].yaw).abs();
         let bent = if rounding[k].is_some() { 2.0 * head } else { head };
-        push(&mut nodes, &mut links, on(head, cap), Link {
-            direction: straight.direction,
-            length: bent,
-            turn: turn_in.max(leaving),
-        });
+        push(
+            &mut nodes,
+            &mut links,
+            on(head, cap),
+            Link { direction: straight.direction, length: bent, turn: turn_in.max(leaving) },
+        );
         let (tail, cap) = match rounding[k + 1] {
             Some((reach, speed)) => (reach, speed),
             None => (ramp.min(SHARE * straight.length), cruise),
         };
         let middle = straight.length - head - tail;
-        let moving = (0..limits.joints.len())
-            .any(|j| straight.joints.windows(2).any(|w| (w[1].1[j] - w[0].1[j]).abs() > 1e-9));
-        let count = (middle / if moving { LONGEST_MOVING } else { longest }).ceil().max(1.0) as usize;
+        let moving =
+            (0..limits.joints.len()).any(|j| straight.joints.windows(2).any(|w| (w[1].1[j] - w[0].1[j]).abs() > 1e-9));
+        let count = (middle / if moving { LONGEST_MOVING } else { LONGEST }).ceil().max(1.0) as usize;
         for i in 1..=count {
             let d = head + middle * i as f64 / count as f64;
             let cap = if i == count { cap } else { cruise };
-            push(&mut nodes, &mut links, on(d, cap), Link {
-                direction: straight.direction,
-                length: middle / count as f64,
-                turn: 0.0,
-            });
+            push(
+                &mut nodes,
+                &mut links,
+                on(d, cap),
+                Link { direction: straight.direction, length: middle / count as f64, turn: 0.0 },
+            );
         }
         if rounding[k + 1].is_none() {
-            push(&mut nodes, &mut links, on(straight.length, 0.0), Link {
-                direction: straight.direction,
-                length: tail,
-                turn: 0.0,
-            });
+            push(
+                &mut nodes,
+                &mut links,
+                on(straight.length, 0.0),
+                Link { direction: straight.direction, length: tail, turn: 0.0 },
+            );
         }
     }
     if links.is_empty() {
@@ -307,7 +309,8 @@ fn assemble(nodes: &[Node], links: &[Link], limits: &Limits) -> Guess {
     }
     for (k, link) in links.iter().enumerate() {
         let cap = speed[k].max(speed[k + 1]).max(USED * limits.speed);
-        let mut time = if link.length > 0.0 { trapezoid(speed[k], speed[k + 1], cap, link.length, acceleration) } else { 0.0 };
+        let mut time =
+            if link.length > 0.0 { trapezoid(speed[k], speed[k + 1], cap, link.length, acceleration) } else { 0.0 };
         let rest_to_rest = |change: f64, speed: f64, acceleration: f64| {
             (PEAK_SPEED * change / speed).max((PEAK_ACCELERATION * change / acceleration).sqrt())
         };

@@ -83,7 +83,8 @@ mod tests {
     fn each_order_is_the_derivative_of_the_one_before() {
         let data = [0.3, -1.0, 2.0, 0.7, 1.5, -0.4];
         for order in 1..4 {
-            let numeric = crate::math::fd::numeric_gradient(|u| Basis::new(u[0]).at(&data)[order - 1], &[0.37], 1e-3)[0];
+            let numeric =
+                crate::math::fd::numeric_gradient(|u| Basis::new(u[0]).at(&data)[order - 1], &[0.37], 1e-3)[0];
             assert!((Basis::new(0.37).at(&data)[order] - numeric).abs() < 1e-7);
         }
         let c = coefficients(&data);

@@ -111,9 +111,7 @@ impl Integral {
         let (Some((first, last)), 1.0) = (&self.ends, self.share) else { return [0.0; 2 * DATA] };
         let correction = self.step * self.step / 12.0;
         let (own, from, to) = (last.by(axis), first.slope_by(axis), last.slope_by(axis));
-        std::array::from_fn(|k| {
-            self.step * (self.sum_by[axis][k] + 0.5 * own[k]) + correction * (from[k] - to[k])
-        })
+        std::array::from_fn(|k| self.step * (self.sum_by[axis][k] + 0.5 * own[k]) + correction * (from[k] - to[k]))
     }
 }
 

@@ -67,8 +67,7 @@ impl Layout {
     /// Of each local coordinate, its unknown's index less that of the piece's first unknown.
     pub fn offsets(self) -> Vec<usize> {
         let block = self.block();
-        let data = (0..DATA * self.dimensions)
-            .map(|i| (i % DATA) / ORDERS * block + ORDERS * (i / DATA) + i % ORDERS);
+        let data = (0..DATA * self.dimensions).map(|i| (i % DATA) / ORDERS * block + ORDERS * (i / DATA) + i % ORDERS);
         let start = ORDERS * self.dimensions;
         data.chain([start + 2, start, start + 1, block + start, block + start + 1]).collect()
     }

@@ -23,9 +23,44 @@ use layout::Layout;
 use problem::{Problem, Weights};
 use solver::{SolverOptions, solve};
 
-pub fn env(name: &str, default: f64) -> f64 {
-    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
+/// How to optimise heading and arc length.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SteerOptions {
+    /// Weight of the jerk (squared, relative to the wheels' and joints' jerk limits) against time; larger is smoother, and slower in
+    /// the optimiser's own timing. Default 130: a mean jerk as small as \[SCR\]'s at its limits. The time law makes up for nearly
+    /// all of it.
+    pub smoothness: f64,
+    /// Weight of a limit overstepped by 100 % for 1 s, s. Default 30.
+    pub motion_weight: f64,
+    /// Weight of one contour point that misses the clearance by [`OptimizeOptions::clearance_scale`] for 1 s, s. Default 200.
+    pub clearance_weight: f64,
+    /// Limits and clearance are looked at once in this distance, m (default 0.15), and in this time, s (default 0.2), of the first
+    /// guess.
+    pub sample_distance: f64,
+    /// See `sample_distance`.
+    pub sample_time: f64,
+    /// Steps at most. Default 80.
+    pub max_iterations: usize,
+    /// The iteration ends where a step lowers the cost by less than this share. Default 2e-3.
+    pub tolerance: f64,
 }
+
+impl Default for SteerOptions {
+    fn default() -> Self {
+        Self {
+            smoothness: 130.0,
+            motion_weight: 30.0,
+            clearance_weight: 200.0,
+            sample_distance: 0.15,
+            sample_time: 0.2,
+            max_iterations: 80,
+            tolerance: 2e-3,
+        }
+    }
+}
+
+/// Largest gap that is left between pieces, m: the end point may be off by a few of them.
+const GAP_TOLERANCE: f64 = 1e-7;
 
 /// Smooths a path as one motion from its first state to its last.
 pub fn optimize_steered<F: DistanceField>(
@@ -49,34 +84,33 @@ pub fn optimize_steered<F: DistanceField>(
     let spacing = options.contour_spacing.unwrap_or_else(|| field.cell().clamp(0.03, 0.08));
     let contour = Contour::new(robot, spacing);
     let clearance = ClearancePenalty::new(contour, robot, options.clearance, options.clearance_scale, field.cell());
+    let own = &options.steer;
     let weights = Weights {
-        smoothness: env("SM", 0.5),
-        motion: env("MO", 30.0),
-        clearance: env("CL", 200.0),
-        clearance_unit: 0.05,
+        smoothness: own.smoothness,
+        motion: own.motion_weight,
+        clearance: own.clearance_weight,
+        clearance_unit: options.clearance_scale,
     };
     let layout = first.layout;
-    let counts: Vec<usize> = (0..layout.pieces)
-        .map(|k| {
-            let length = (first.x[layout.state(k + 1, 1, 0)] - first.x[layout.state(k, 1, 0)]).abs();
-            let time = first.x[layout.duration(k)].exp();
-            let count = (length / env("DL", 0.1)).max(time / env("DT", 0.15));
-            2 * (0.5 * count.clamp(4.0, 20.0)).ceil() as usize
-        })
-        .collect();
-    let mut problem =
-        Problem::new(robot, field, clearance, first.directions, first.fixed, &counts, weights);
+    let counts: Vec<usize> = (0..layout.pieces).map(|k| samples(layout, k, &first.x, own)).collect();
+    let mut problem = Problem::new(robot, field, clearance, first.directions, first.fixed, &counts, weights);
     let mut x = first.x;
-    let options = SolverOptions {
-        max_iterations: env("ITER", 100.0) as usize,
-        tolerance: env("TOL", 1e-3),
-        gap_tolerance: 1e-6,
-    };
-    let solved = solve(&mut problem, &mut x, &options);
+    let solver =
+        SolverOptions { max_iterations: own.max_iterations, tolerance: own.tolerance, gap_tolerance: GAP_TOLERANCE };
+    let solved = solve(&mut problem, &mut x, &solver);
     let leg = SteerLeg { pose: path.states[0].pose, curve: curve(layout, &x) };
     let ending = if solved.converged { Ending::Converged } else { Ending::IterationLimit };
     let outcome = OptimiserOutcome { pieces: layout.pieces, iterations: solved.iterations, ending, cost: solved.cost };
     trajectory(Leg::Steer(leg), outcome)
+}
+
+/// How often a piece is looked at: an even number.
+fn samples(layout: Layout, piece: usize, x: &[f64], options: &SteerOptions) -> usize {
+    let arc = |node: usize| x[layout.state(node, layout::ARC, 0)];
+    let length = (arc(piece + 1) - arc(piece)).abs();
+    let time = x[layout.duration(piece)].exp();
+    let count = (length / options.sample_distance).max(time / options.sample_time);
+    2 * (0.5 * count.clamp(4.0, 20.0)).ceil() as usize
 }
 
 fn trajectory(leg: Leg, outcome: OptimiserOutcome) -> Trajectory {

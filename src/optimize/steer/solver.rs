@@ -31,6 +31,8 @@ pub(super) struct Solved {
 const GAP_PRICE: f64 = 200.0;
 /// Damping at first; it follows how well the model predicts.
 const FIRST_DAMPING: f64 = 0.3;
+/// Share of the costs' own curvature in the damping.
+const DIAGONAL_SHARE: f64 = 0.01;
 /// Contour points a sample that a step made again looks at.
 const POINTS: usize = 3;
 /// The iteration ends where a step lowers the merit little and leaves gaps below this, m.
@@ -75,21 +77,17 @@ pub(super) fn solve<F: DistanceField>(problem: &mut Problem<'_, F>, x: &mut [f64
         multipliers: vec![[0.0; 2]; layout.pieces],
         next_multipliers: vec![[0.0; 2]; layout.pieces],
     };
-    let mut damping = crate::optimize::steer::env("DAMP", FIRST_DAMPING);
+    let mut damping = FIRST_DAMPING;
     let mut cost = problem.evaluate(x, &work.multipliers, &mut work.here);
     let mut solved = Solved { cost, iterations: 0, converged: false };
-    let trace = std::env::var("TRACE").is_ok();
     while solved.iterations < options.max_iterations {
         let mut rows: Vec<Row> = Vec::new();
         let mut merit = None;
         // The second time with the contour points that the first has pushed into obstacles.
-        for attempt in 0..crate::optimize::steer::env("ATT", 2.0) as usize {
+        for _ in 0..2 {
             solved.iterations += 1;
             merit = work.attempt(problem, x, cost, damping, &rows);
             let Some(found) = &merit else { break };
-            if trace {
-                eprintln!("  it {} att {attempt} rows {} merit {:.5} -> {:.5} pred {:.2e} damp {:.1e} gap {:.1e}", solved.iterations, rows.len(), found.here, found.there, found.here - found.predicted, damping, largest(&work.there.gaps));
-            }
             if found.accepted() {
                 break;
             }
@@ -103,7 +101,7 @@ pub(super) fn solve<F: DistanceField>(problem: &mut Problem<'_, F>, x: &mut [f64
             Some(merit) => {
                 let ratio = (merit.here - merit.there) / (merit.here - merit.predicted);
                 damping *= match ratio {
-                    r if r > 0.75 => crate::optimize::steer::env("DEC", 0.2),
+                    r if r > 0.75 => 0.33,
                     r if r < 0.25 => 3.0,
                     _ => 0.6,
                 };
@@ -118,7 +116,7 @@ pub(super) fn solve<F: DistanceField>(problem: &mut Problem<'_, F>, x: &mut [f64
                 }
             }
             None => {
-                damping *= crate::optimize::steer::env("INC", 8.0);
+                damping *= 8.0;
                 let hopeless = merit.is_some_and(|m| (m.here - m.predicted).abs() <= 1e-9 * cost.abs());
                 if damping > 1e8 || hopeless {
                     solved.converged = hopeless;
@@ -148,7 +146,8 @@ impl Workspace {
         damping: f64,
         rows: &[Row],
     ) -> Option<Merit> {
-        let mut taken: Vec<bool> = rows.iter().map(|row| problem.after(row, &self.step) > 0.0 && row.value < 0.0).collect();
+        let mut taken: Vec<bool> =
+            rows.iter().map(|row| problem.after(row, &self.step) > 0.0 && row.value < 0.0).collect();
         loop {
             self.factor.copy_from(&self.here.hessian);
             self.gradient.copy_from_slice(&self.here.gradient);
@@ -234,7 +233,8 @@ impl Workspace {
             self.step.fill(0.0);
             for (piece, by) in problem.gap_jacobians(x).iter().enumerate() {
                 for axis in 0..2 {
-                    let row = Row { piece, weight: STIFFNESS, value: self.here.gaps[piece][axis], by: by[axis].clone() };
+                    let row =
+                        Row { piece, weight: STIFFNESS, value: self.here.gaps[piece][axis], by: by[axis].clone() };
                     problem.pull(&row, &mut self.step);
                 }
             }
@@ -245,9 +245,6 @@ impl Workspace {
         cost
     }
 }
-
-/// Share of the costs' own curvature in the damping.
-const DIAGONAL_SHARE: f64 = 0.01;
 
 fn price(multiplier: f64, gap: f64) -> f64 {
     gap * (multiplier + 0.5 * GAP_PRICE * gap)

@@ -72,7 +72,9 @@ fn a_straight_line_takes_the_known_time_under_every_law_that_may_time_it() {
 fn dbg_optimal() {
     let robot = fixtures::conv();
     for (name, best) in [("line", 11.5), ("c_curve", 17.4432), ("s_curve", 17.1396), ("arbitrary", 12.0655)] {
-        if name == "line" { continue; }
+        if name == "line" {
+            continue;
+        }
         let (trajectory, task) = (path(name), task(&robot, false));
         let curved = course(&trajectory);
         let mut times = vec![];
@@ -84,7 +86,13 @@ fn dbg_optimal() {
         }
         let leg = leg.unwrap();
         times.sort_by(f64::total_cmp);
-        eprintln!("{name}: {} ({:+.3} %) stretch {} before {:+.3} %, {:.2} ms", leg.duration(), (leg.duration() / best - 1.0) * 100.0, leg.stretch,
-            (leg.duration() / leg.stretch / best - 1.0) * 100.0, times[0]);
+        eprintln!(
+            "{name}: {} ({:+.3} %) stretch {} before {:+.3} %, {:.2} ms",
+            leg.duration(),
+            (leg.duration() / best - 1.0) * 100.0,
+            leg.stretch,
+            (leg.duration() / leg.stretch / best - 1.0) * 100.0,
+            times[0]
+        );
     }
 }

@@ -205,7 +205,13 @@ impl Barrier {
             if share > 0.5 && self.constraints() as f64 * mu <= GAP * self.time(x) {
                 return taken + 1;
             }
-            mu *= if share > 0.9 { 0.15 } else if share > 0.5 { 0.4 } else { 1.0 };
+            mu *= if share > 0.9 {
+                0.15
+            } else if share > 0.5 {
+                0.4
+            } else {
+                1.0
+            };
         }
         STEPS
     }

@@ -42,7 +42,8 @@ impl Grid {
     /// Cells of about equal duration, and knots where the rows jump.
     pub fn new(problem: &Problem<'_>, rates: &mut impl FnMut(f64, &mut Vec<[f64; 3]>)) -> Option<Self> {
         let stretches = stretches(problem, rates)?;
-        let least: f64 = stretches.iter().map(|s| (s.to - s.from) * s.slowness.iter().sum::<f64>() / SAMPLES as f64).sum();
+        let least: f64 =
+            stretches.iter().map(|s| (s.to - s.from) * s.slowness.iter().sum::<f64>() / SAMPLES as f64).sum();
         let cells = (least / problem.step).clamp(CELLS.0, CELLS.1);
         let slowness = graded(&stretches, cells / least);
         // Least time up to each sample's end.
@@ -78,7 +79,11 @@ impl Grid {
                 }
                 let stretch = &stretches[sample / SAMPLES];
                 let start = stretch.from + (sample % SAMPLES) as f64 * width(sample);
-                let knot = if part == 0 { stretches[pair[0]].from } else { start + (target - least[sample]) / slowness[sample] };
+                let knot = if part == 0 {
+                    stretches[pair[0]].from
+                } else {
+                    start + (target - least[sample]) / slowness[sample]
+                };
                 if knots.last().is_none_or(|last| knot > *last) {
                     knots.push(knot);
                     knot_slowness.push(slowness[sample]);
