@@ -47,6 +47,10 @@ pub struct EvalArgs {
     /// Write DIR/ID/commands.csv and report.json of each certified scene.
     #[arg(long, value_name = "DIR")]
     write_commands: Option<PathBuf>,
+    /// Draw each scene as DIR/ID.svg: from above, obstacles, path and robot; below, joints and wheels over time [default: out for
+    /// fig5 and fig6, which makes out/fig5.svg; others: nothing is drawn].
+    #[arg(long, value_name = "DIR")]
+    plot: Option<PathBuf>,
     /// Print the milliseconds of each stage too.
     #[arg(long)]
     profile: bool,
@@ -75,12 +79,20 @@ pub fn eval(args: &EvalArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics>
         write_file(path, text.text.as_bytes())?;
     }
     let writer = args.write_commands.as_deref().map(|folder| Writer::new(folder, &set, &text, &loaded));
-    let runs = if suite == Some(Suite::Table2) { 2 } else { 1 };
+    let runs = if suite.is_some_and(Suite::compares_dense) { 2 } else { 1 };
     let bar = progress(terminal, runs * set.scenes.len());
+    let plots = args.plot.clone().or_else(|| suite.filter(|s| s.is_figure()).map(|_| PathBuf::from("out")));
+    if let Some(folder) = &plots {
+        make_folder(folder)?;
+    }
     let run = |dense: bool, writer: Option<&Writer<'_>>| -> Result<Vec<Judged>, Diagnostics> {
         let options = CompileOptions { dense, ..CompileOptions::default() };
         let judge = |scene| {
             let (judged, outcome) = eval::judge(&set, scene, &loaded.robot, &options)?;
+            if let Some(folder) = plots.as_deref().filter(|_| dense) {
+                let picture = eval::picture(&set, scene, suite, &loaded.robot, &outcome)?;
+                write_file(&folder.join(format!("{}.svg", scene.id)), picture.as_bytes())?;
+            }
             if let Some(writer) = writer {
                 writer.write(&judged, outcome)?;
             }
@@ -165,7 +177,7 @@ impl Loaded {
                 let path = robot_file(path)?;
                 (path.display().to_string(), inputs::read_robot_files(&path, disk, None)?)
             }
-            (None, Some(Suite::Table1)) => built_in(&SCR_DB)?,
+            (None, Some(suite)) if suite.has_blades() => built_in(&SCR_DB)?,
             (None, Some(_)) => built_in(&BOX_BASE)?,
             (None, None) => {
                 let message = "these scenes belong to no suite by their `name`, so they need `--robot`";
@@ -223,6 +235,13 @@ fn progress(terminal: &Terminal, scenes: usize) -> ProgressBar {
     let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} scenes, {eta} left");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     bar
+}
+
+fn make_folder(path: &Path) -> Result<(), Diagnostics> {
+    std::fs::create_dir_all(path).map_err(|error| {
+        let message = format!("cannot make folder `{}`: {error}", path.display());
+        Diagnostic::error("output/io", message).hint("the folder above must be writable").into()
+    })
 }
 
 fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Diagnostics> {

@@ -17,7 +17,7 @@ pub fn render(suite: Option<Suite>, judged: &[Judged], without_dense: &[Judged])
     match suite {
         Some(Suite::Table1) => table1(judged),
         Some(Suite::Table2) => table2(judged, without_dense),
-        Some(Suite::Table3) | None => table3(judged, suite.is_some()),
+        Some(Suite::Table3 | Suite::Fig5 | Suite::Fig6) | None => table3(judged, suite.is_some()),
     }
 }
 
