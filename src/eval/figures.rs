@@ -43,6 +43,7 @@ fn scene(suite: Option<Suite>, judged: &Judged) -> Value {
         "planned": judged.planned,
         "driven": judged.driven,
         "bound_s": judged.bound.1,
+        "turns": judged.turns,
     });
     if let (Some(failure), Value::Object(map)) = (&judged.failure, &mut scene) {
         map.insert("failure".into(), value(failure));
@@ -82,7 +83,7 @@ fn totals(set: &SceneSet, suite: Option<Suite>, judged: &[Judged], without_dense
         "by_boxes": rows.collect::<Vec<_>>(),
         "profile_ms": profile,
     });
-    if suite == Some(Suite::Table2) {
+    if suite.is_some_and(Suite::compares_dense) {
         let excess = |judged: &[Judged], of: fn(&Judged) -> Option<AlphaExcess>| {
             let all: Vec<AlphaExcess> = judged.iter().filter(|j| j.certified).filter_map(of).collect();
             value(&ExcessRow::of(&all))

@@ -25,25 +25,33 @@ pub(super) fn scene(suite: Suite) -> Option<Fixed> {
     }
 }
 
-/// Fig. 5: rows of boxes of 60 cm, each row with one gap that a box of 40 cm passes, lanes of about 70 cm between them: the way
-/// leads around a dozen corners, and start and goal face walls.
+/// Fig. 5: boxes of 60 cm with lanes of 50 cm between them. A box of 40 cm drives straight there and turns only where two lanes
+/// cross: everywhere else its corners would touch. Smaller boxes close lanes so that the way turns at every second crossing.
 fn dense() -> Fixed {
-    /// Lower edge of a row, and the left edges of its boxes with how far each is moved up.
-    type Row = (i32, [(i32, i32); 8]);
-    const ROWS: [Row; 4] = [
-        (15, [(0, 0), (13, 1), (26, 0), (39, 0), (52, 1), (65, 0), (93, 0), (108, 1)]),
-        (43, [(0, 0), (28, 1), (41, 0), (54, 0), (68, 1), (81, 0), (94, 0), (107, 0)]),
-        (71, [(1, 0), (14, 1), (27, 0), (40, 1), (53, 0), (66, 0), (79, 1), (107, 0)]),
-        (99, [(0, 1), (13, 0), (26, 0), (54, 1), (67, 0), (80, 0), (94, 0), (107, 1)]),
-    ];
-    let row = |(y, boxes): Row| {
-        boxes.map(|(x, up)| CellBox { min: [x, y + up, 0], max: [x + 12, y + up + 12, 8] })
-    };
+    // Of a box, and between two.
+    const EDGE: i32 = 12;
+    const LANE: i32 = 10;
+    /// From a box to the next.
+    const PITCH: i32 = EDGE + LANE;
+    /// Boxes along a side.
+    const ALONG: i32 = 5;
+    /// Lanes closed between two crossings. Lanes along x: (crossing on the left, lane) from 0; the closing box stands in the
+    /// middle, so that one can still turn at the crossings.
+    const CLOSED_ALONG_X: [[i32; 2]; 7] = [[1, 0], [2, 0], [0, 1], [1, 1], [1, 2], [2, 2], [2, 3]];
+    /// Lanes along y: (lane, crossing below).
+    const CLOSED_ALONG_Y: [[i32; 2]; 3] = [[0, 0], [0, 1], [1, 2]];
+    let of = |x: i32, y: i32, [w, d]: [i32; 2]| CellBox { min: [x, y, 0], max: [x + w, y + d, 8] };
+    let boxes = (0..ALONG * ALONG).map(|k| of(k % ALONG * PITCH, k / ALONG * PITCH, [EDGE; 2]));
+    let lane = |k: i32| EDGE + k * PITCH;
+    let middle = |k: i32| PITCH * (k + 1) + 3;
+    let along_x = CLOSED_ALONG_X.map(|[left, at]| of(middle(left), lane(at), [6, LANE]));
+    let along_y = CLOSED_ALONG_Y.map(|[at, below]| of(lane(at), middle(below), [LANE, 6]));
+    let side = ALONG * PITCH - LANE;
     Fixed {
-        room: [120, 127, 8],
-        boxes: ROWS.into_iter().flat_map(row).collect(),
-        start: [7.0, 7.0, 180.0],
-        goal: [8.0, 120.0, -90.0],
+        room: [side, side, 8],
+        boxes: boxes.chain(along_x).chain(along_y).collect(),
+        start: [17.0, 17.0, 180.0],
+        goal: [83.0, 83.0, -90.0],
         blade: None,
     }
 }

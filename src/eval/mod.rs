@@ -6,6 +6,7 @@
 mod bound;
 mod excess;
 mod fault;
+mod figure_tables;
 pub mod figures;
 mod fixed;
 mod generate;
@@ -20,6 +21,7 @@ mod scenes;
 mod statistics;
 pub mod tables;
 mod text_table;
+mod turns;
 
 pub use bound::travel_time;
 pub use excess::AlphaExcess;
@@ -30,6 +32,7 @@ pub use picture::picture;
 pub use read::{LONGEST, read};
 pub use scenes::{SCHEMA, Scene, SceneSet};
 pub use statistics::Summary;
+pub use turns::{Turns, least_radius};
 
 /// The suites of \[SCR\] section VI, and the scenes of two of its figures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]

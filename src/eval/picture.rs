@@ -1,6 +1,7 @@
 //! A scene and what was compiled in it, as a picture.
 
-use super::{Scene, SceneSet, Suite};
+use super::paper::FIG5_LEAST_RADIUS;
+use super::{Scene, SceneSet, Suite, Turns};
 use crate::diag::Diagnostics;
 use crate::geom::Pose2;
 use crate::mission::PoseSpec;
@@ -34,7 +35,10 @@ pub fn picture(
             charts.extend(motion::joint_charts(table, Some(robot)));
             charts.push(motion::wheel_chart(table, Some(robot)));
             if suite == Some(Suite::Fig5) {
-                charts.push(motion::radius_chart(table));
+                charts.push(motion::radius_chart(table).level("the paper's least, 9.3 mm", 1e3 * FIG5_LEAST_RADIUS));
+                if let Some((at, _)) = Turns::of(table).tightest {
+                    view.mark(at, "tightest while driving");
+                }
             }
             let proven = compiled.certificate.clearance_proven.unwrap_or(0.0);
             let length = crate::report::metrics::of_commands(table).length_m;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::paper;
+use super::{figure_tables, paper};
 use super::statistics::{Summary, mean, mean_metrics};
 use super::text_table::{TextTable, fixed};
 use super::{AlphaExcess, Judged, Suite};
@@ -12,12 +12,14 @@ use crate::report::Metrics;
 const MOST_ROWS: usize = 6;
 
 /// The table of a suite; without one, Table III's figures for all scenes. `without_dense`: the same scenes without dense
-/// sampling (Table II).
+/// sampling (Table II, Fig. 5).
 pub fn render(suite: Option<Suite>, judged: &[Judged], without_dense: &[Judged]) -> String {
     match suite {
         Some(Suite::Table1) => table1(judged),
         Some(Suite::Table2) => table2(judged, without_dense),
-        Some(Suite::Table3 | Suite::Fig5 | Suite::Fig6) | None => table3(judged, suite.is_some()),
+        Some(Suite::Fig5) => figure_tables::fig5(judged, without_dense, judged.first().map_or(f64::NAN, |j| j.least_radius)),
+        Some(Suite::Fig6) => figure_tables::fig6(judged),
+        Some(Suite::Table3) | None => table3(judged, suite.is_some()),
     }
 }
 

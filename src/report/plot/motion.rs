@@ -6,9 +6,9 @@ use crate::geom::Pose2;
 use crate::robot::RobotModel;
 
 /// About so many outlines are drawn along a motion.
-const OUTLINES: f64 = 28.0;
+const OUTLINES: f64 = 40.0;
 /// Every so many outlines the time is written.
-const LABELLED: usize = 4;
+const LABELLED: usize = 5;
 
 /// A state a row: replayed pose, planned joint values.
 pub fn states(table: &CommandTable) -> Vec<(Pose2, &[f64])> {
@@ -73,14 +73,16 @@ pub fn joint_charts(table: &CommandTable, robot: Option<&RobotModel>) -> Vec<Cha
     table.joints.iter().enumerate().map(chart).collect()
 }
 
-/// The radius on which the base turns, mm, over time, on a logarithmic axis from 0.1 mm to 100 m; gaps where it does not turn.
+/// The radius on which the base turns, mm, over time, on a logarithmic axis from 0.1 mm to 10 m; gaps where it does not turn, or on
+/// a larger one.
 pub fn radius_chart(table: &CommandTable) -> Chart {
     let radius = |k: usize| {
         let (v, omega) = table.twist(k);
-        if omega.abs() < 1e-3 { f64::NAN } else { (1e3 * v.abs() / omega.abs()).clamp(0.1, 1e5) }
+        let radius = 1e3 * v.abs() / omega.abs();
+        if omega.abs() < 1e-3 || radius > 1e4 { f64::NAN } else { radius.max(0.1) }
     };
     let points = (0..table.rows.len()).map(|k| [table.time(k), radius(k)]).collect();
-    let chart = Chart::new("Turn radius (0.1 mm: less, a turn on the spot)", "time s", "radius mm");
+    let chart = Chart::new("Turn radius (0.1 mm and less: on the spot)", "time s", "radius mm");
     Chart { y_spread: Spread::Logarithmic, ..chart.line("", points, Join::Held) }
 }
 

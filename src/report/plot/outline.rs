@@ -80,7 +80,22 @@ pub(super) fn of_robot(robot: &RobotModel, pose: Pose2, q: &[f64]) -> Vec<Part> 
         }
         Part { outline, fixed: robot.bodies[shape.body].motion.is_none() }
     };
-    robot.shapes.iter().zip(&poses).map(part).collect()
+    let parts: Vec<Part> = robot.shapes.iter().zip(&poses).map(part).collect();
+    // What lies within the outline of another part of the same kind adds nothing but ink: wheels below a base.
+    let hidden = |k: usize| {
+        let holds = |o: usize| parts[o].fixed == parts[k].fixed && within(&parts[k].outline, &parts[o].outline);
+        (0..parts.len()).any(|o| o != k && holds(o) && !(o > k && within(&parts[o].outline, &parts[k].outline)))
+    };
+    (0..parts.len()).filter(|k| !hidden(*k)).map(|k| parts[k].clone()).collect()
+}
+
+/// Whether all points lie in a convex outline, counter-clockwise, or on its edge.
+fn within(points: &[[f64; 2]], outline: &[[f64; 2]]) -> bool {
+    let left = |a: &[f64; 2], b: &[f64; 2], p: &[f64; 2]| {
+        (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) >= -1e-9
+    };
+    let edges = || outline.iter().zip(outline.iter().cycle().skip(1));
+    points.iter().all(|p| edges().all(|(a, b)| left(a, b, p)))
 }
 
 /// Greatest height of the robot with joint values `q`, m.
@@ -117,6 +132,12 @@ mod tests {
             let cells = (0..25).filter(|k| inside(k / 5, k % 5)).count() as i64;
             assert_eq!(area(&loops), 2 * cells, "{bits:b}");
         }
+    }
+
+    #[test]
+    fn a_part_below_another_is_within_it_and_not_the_other_way_round() {
+        let square = |half: f64| vec![[-half, -half], [half, -half], [half, half], [-half, half]];
+        assert!(within(&square(1.0), &square(2.0)) && !within(&square(2.0), &square(1.0)));
     }
 
     #[test]

@@ -64,7 +64,7 @@ impl TopView {
             Some(map.origin[2] + map.resolution * (64 * word + words[word].trailing_zeros() as usize) as f64)
         };
         let kinds: [(&'static str, &'static str, &dyn Fn(f64) -> bool); 2] = [
-            ("passed under", OVERHEAD, &|z| z >= under - 1e-9),
+            ("overhead", OVERHEAD, &|z| z >= under - 1e-9),
             ("obstacle", OBSTACLE, &|z| z < under - 1e-9),
         ];
         for (name, colour, of_kind) in kinds {
