@@ -71,11 +71,13 @@ pub struct CompileOptions {
     pub sampling_time: Option<f64>,
     /// Dense sampling in the optimiser (\[SCR\] section IV-C). Default true.
     pub dense: bool,
+    /// Turns that are better made on the spot stay so. False: every turn is part of a smooth curve, as in \[SCR\]. Default true.
+    pub spins: bool,
 }
 
 impl Default for CompileOptions {
     fn default() -> Self {
-        Self { sampling_time: None, dense: true }
+        Self { sampling_time: None, dense: true, spins: true }
     }
 }
 
@@ -184,7 +186,7 @@ fn stages(
     let finish = Finish { mission, robot, map: map.as_ref(), sampling_time };
     let made = match (given, map) {
         (Some(trajectory), _) => finish.certify(run, trajectory)?,
-        (None, Some(map)) => plan(run, &finish, map, options.dense)?,
+        (None, Some(map)) => plan(run, &finish, map, options)?,
         (None, None) => {
             let message = "the mission has neither a map nor a path of its own";
             return Err(Diagnostic::error("mission/no-map", message).into());
@@ -218,7 +220,12 @@ struct Made {
 }
 
 /// Searches and optimises until something is certified; the search's own path is the last try.
-fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, dense: bool) -> Result<Made, Diagnostics> {
+fn plan(
+    run: &mut Run<'_>,
+    finish: &Finish<'_>,
+    map: &VoxelMap,
+    compile: &CompileOptions,
+) -> Result<Made, Diagnostics> {
     let (mission, robot) = (finish.mission, finish.robot);
     let field = run.stage("esdf", || esdf::build(map));
     let query = query(mission, robot);
@@ -237,7 +244,8 @@ fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, dense: bool) -> 
         return finish.certify(run, path.trajectory());
     }
     for margin in OPTIMISER_MARGINS {
-        let options = OptimizeOptions { clearance: mission.clearance + margin, dense, ..Default::default() };
+        let usual = if compile.spins { OptimizeOptions::default() } else { OptimizeOptions::without_spins() };
+        let options = OptimizeOptions { clearance: mission.clearance + margin, dense: compile.dense, ..usual };
         let trajectory = run.stage("optimize", || optimize::optimize(&path, &field, robot, &options));
         // A trajectory that no law can time is one more reason to go on to the next try.
         if let Some(made) = finish.certify(run, trajectory).ok().filter(|made| made.certificate.holds()) {

@@ -28,11 +28,13 @@ pub use excess::AlphaExcess;
 pub use fault::ScenesError;
 pub use generate::{default_boxes, default_count, document};
 pub use judge::{Judged, judge};
-pub use picture::picture;
+pub use picture::{picture, picture_name};
 pub use read::{LONGEST, read};
 pub use scenes::{SCHEMA, Scene, SceneSet};
 pub use statistics::Summary;
 pub use turns::{Turns, least_radius};
+
+use crate::pipeline::CompileOptions;
 
 /// The suites of \[SCR\] section VI, and the scenes of two of its figures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -74,9 +76,15 @@ impl Suite {
         matches!(self, Self::Table1 | Self::Fig6)
     }
 
-    /// Whether each scene is compiled without dense sampling too.
-    pub fn compares_dense(self) -> bool {
-        matches!(self, Self::Table2 | Self::Fig5)
+    /// How each scene is compiled besides as usual. Table II: without dense sampling. Fig. 5: every turn part of one smooth curve,
+    /// as in the paper, without dense sampling and with it.
+    pub fn variants(self) -> Vec<CompileOptions> {
+        let usual = CompileOptions::default();
+        match self {
+            Self::Table2 => vec![CompileOptions { dense: false, ..usual }],
+            Self::Fig5 => [false, true].map(|dense| CompileOptions { dense, spins: false, ..usual }).to_vec(),
+            Self::Table1 | Self::Table3 | Self::Fig6 => Vec::new(),
+        }
     }
 
     /// The suite that a set of scenes belongs to by its name, such as `table3-35`.

@@ -5,12 +5,23 @@ use super::{Scene, SceneSet, Suite, Turns};
 use crate::diag::Diagnostics;
 use crate::geom::Pose2;
 use crate::mission::PoseSpec;
-use crate::pipeline::Outcome;
+use crate::pipeline::{CompileOptions, Outcome};
 use crate::report::plot::{Figure, Panel, TopView, motion, top};
 use crate::robot::RobotModel;
 
 /// Values tried of each joint for the robot's least height.
 const POSTURES: usize = 17;
+
+/// File name of a scene's picture; `None`: this variant of it is not drawn. Fig. 5 shows the smooth curve of the paper's way, and
+/// what is compiled as usual beside it.
+pub fn picture_name(scene: &Scene, suite: Option<Suite>, options: &CompileOptions) -> Option<String> {
+    let suffix = match (suite, options.dense, options.spins) {
+        (Some(Suite::Fig5), true, true) => "-spins",
+        (Some(Suite::Fig5), true, false) | (_, true, true) => "",
+        _ => return None,
+    };
+    Some(format!("{}{suffix}.svg", scene.id))
+}
 
 /// The picture of a scene: from above, obstacles, path and the robot on its way; below, wheels and joints over time (of Fig. 5's
 /// scene the radius on which it turns). A scene that failed shows its start and goal.
@@ -36,8 +47,14 @@ pub fn picture(
             charts.push(motion::wheel_chart(table, Some(robot)));
             if suite == Some(Suite::Fig5) {
                 charts.push(motion::radius_chart(table).level("the paper's least, 9.3 mm", 1e3 * FIG5_LEAST_RADIUS));
-                if let Some((at, _)) = Turns::of(table).tightest {
-                    view.mark(at, "tightest while driving");
+                let turns = Turns::of(table);
+                if let Some((radius, (at, _))) = turns.least_driven_m.zip(turns.tightest) {
+                    view.mark(at, format!("tightest while driving: {:.1} mm", 1e3 * radius));
+                    lines.push(format!(
+                        "turns on the spot: {}; least radius while driving {:.1} mm (the paper: 9.3 mm)",
+                        turns.on_the_spot,
+                        1e3 * radius
+                    ));
                 }
             }
             let proven = compiled.certificate.clearance_proven.unwrap_or(0.0);

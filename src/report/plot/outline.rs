@@ -38,17 +38,22 @@ pub(super) fn of_cells(dims: [usize; 2], inside: impl Fn(usize, usize) -> bool) 
     while let Some((&first, _)) = edges.first_key_value() {
         let mut corners: Vec<[usize; 2]> = Vec::new();
         let mut at = first;
+        let straight = |a: [usize; 2], b: [usize; 2], c: [usize; 2]| (0..2).any(|k| a[k] == b[k] && b[k] == c[k]);
         // As many edges end at a corner as begin there, so the way on is missing only at the loop's own beginning.
         while let Some(next) = edges.get_mut(&at).and_then(Vec::pop) {
             if edges.get(&at).is_some_and(Vec::is_empty) {
                 edges.remove(&at);
             }
-            let straight = |a: [usize; 2], b: [usize; 2], c: [usize; 2]| (0..2).any(|k| a[k] == b[k] && b[k] == c[k]);
             match corners[..] {
                 [.., before, last] if straight(before, last, at) => *corners.last_mut().expect("two at least") = at,
                 _ => corners.push(at),
             }
             at = next;
+        }
+        if let [.., before, last] = corners[..]
+            && straight(before, last, first)
+        {
+            corners.pop();
         }
         loops.push(corners);
     }
