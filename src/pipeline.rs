@@ -220,12 +220,7 @@ struct Made {
 }
 
 /// Searches and optimises until something is certified; the search's own path is the last try.
-fn plan(
-    run: &mut Run<'_>,
-    finish: &Finish<'_>,
-    map: &VoxelMap,
-    compile: &CompileOptions,
-) -> Result<Made, Diagnostics> {
+fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, compile: &CompileOptions) -> Result<Made, Diagnostics> {
     let (mission, robot) = (finish.mission, finish.robot);
     let field = run.stage("esdf", || esdf::build(map));
     let query = query(mission, robot);

@@ -76,14 +76,14 @@ pub fn eval(args: &EvalArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics>
     let loaded = Loaded::read(args, &set, suite, &disk)?;
     set.fits(&loaded.robot)?;
     if let Some(path) = &args.write_scenes {
-        write_file(path, text.text.as_bytes())?;
+        output::write_file(path, text.text.as_bytes())?;
     }
     let writer = args.write_commands.as_deref().map(|folder| Writer::new(folder, &set, &text, &loaded));
     let variants = suite.map_or(Vec::new(), Suite::variants);
     let bar = progress(terminal, (1 + variants.len()) * set.scenes.len());
     let plots = args.plot.clone().or_else(|| suite.filter(|s| s.is_figure()).map(|_| PathBuf::from("out")));
     if let Some(folder) = &plots {
-        make_folder(folder)?;
+        output::make_folder(folder)?;
     }
     let mut drawn = Vec::new();
     let mut run = |options: &CompileOptions, writer: Option<&Writer<'_>>| -> Result<Vec<Judged>, Diagnostics> {
@@ -92,7 +92,7 @@ pub fn eval(args: &EvalArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics>
             if let Some((folder, name)) = plots.as_deref().zip(eval::picture_name(scene, suite, options)) {
                 let path = folder.join(name);
                 let picture = eval::picture(&set, scene, suite, &loaded.robot, &outcome)?;
-                write_file(&path, picture.as_bytes())?;
+                output::write_file(&path, picture.as_bytes())?;
                 drawn.push(path);
             }
             if let Some(writer) = writer {
@@ -246,20 +246,6 @@ fn progress(terminal: &Terminal, scenes: usize) -> ProgressBar {
     let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} scenes, {eta} left");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     bar
-}
-
-fn make_folder(path: &Path) -> Result<(), Diagnostics> {
-    std::fs::create_dir_all(path).map_err(|error| {
-        let message = format!("cannot make folder `{}`: {error}", path.display());
-        Diagnostic::error("output/io", message).hint("the folder above must be writable").into()
-    })
-}
-
-fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Diagnostics> {
-    std::fs::write(path, bytes).map_err(|error| {
-        let message = format!("cannot write `{}`: {error}", path.display());
-        Diagnostic::error("output/io", message).hint("the folder must exist and be writable").into()
-    })
 }
 
 /// Writes commands and reports of certified scenes, and removes older ones of those that failed.

@@ -5,7 +5,17 @@ use super::{Judged, Turns, paper};
 
 /// Fig. 5's scene; `variants`: every turn part of one smooth curve, without and with dense sampling.
 pub(super) fn fig5(judged: &[Judged], variants: &[Vec<Judged>]) -> String {
-    let head = ["", "least radius mm", "turns on the spot", "α peak %", "α above %", "clearance cm", "CT ms", "time s", "length m"];
+    let head = [
+        "",
+        "least radius mm",
+        "turns on the spot",
+        "α peak %",
+        "α above %",
+        "clearance cm",
+        "CT ms",
+        "time s",
+        "length m",
+    ];
     let title = "Fig. 5, one dense room (DS: dense sampling; CT: search + optimise; one curve: no turn on the spot, as in the paper)";
     let mut table = TextTable::new(title, &head);
     table.row("paper", [fixed(1e3 * paper::FIG5_LEAST_RADIUS, 1)]);

@@ -3,14 +3,9 @@
 use super::paper::FIG5_LEAST_RADIUS;
 use super::{Scene, SceneSet, Suite, Turns};
 use crate::diag::Diagnostics;
-use crate::geom::Pose2;
-use crate::mission::PoseSpec;
 use crate::pipeline::{CompileOptions, Outcome};
-use crate::report::plot::{Figure, Panel, TopView, motion, top};
+use crate::report::plot::{Figure, Panel, TopView, motion, place};
 use crate::robot::RobotModel;
-
-/// Values tried of each joint for the robot's least height.
-const POSTURES: usize = 17;
 
 /// File name of a scene's picture; `None`: this variant of it is not drawn. Fig. 5 shows the smooth curve of the paper's way, and
 /// what is compiled as usual beside it.
@@ -36,12 +31,21 @@ pub fn picture(
     outcome: &Outcome,
 ) -> Result<String, Diagnostics> {
     let map = set.voxels(scene)?;
-    let mut view = TopView::of_map(&map, least_top(robot));
+    let mut view = TopView::of_map(&map, place::least_top(robot));
     let mut charts = Vec::new();
     let mut lines = Vec::new();
     match &outcome.compiled {
         Some(compiled) => {
             let table = &compiled.commands;
+            let proven = compiled.certificate.clearance_proven.unwrap_or(0.0);
+            let length = crate::report::metrics::of_commands(table).length_m;
+            lines.push(format!(
+                "{}: {length:.2} m in {:.1} s, certified with {:.1} cm of clearance ({:.1} cm asked for)",
+                robot.name,
+                table.duration(),
+                100.0 * proven,
+                100.0 * set.clearance
+            ));
             motion::draw(&mut view, robot, table);
             charts.extend(motion::joint_charts(table, Some(robot)));
             charts.push(motion::wheel_chart(table, Some(robot)));
@@ -57,22 +61,11 @@ pub fn picture(
                     ));
                 }
             }
-            let proven = compiled.certificate.clearance_proven.unwrap_or(0.0);
-            let length = crate::report::metrics::of_commands(table).length_m;
-            lines.push(format!(
-                "{}: {length:.2} m in {:.1} s, certified with {:.1} cm of clearance ({:.1} cm asked for)",
-                robot.name,
-                table.duration(),
-                100.0 * proven,
-                100.0 * set.clearance
-            ));
         }
         None => {
             let reason = outcome.report.failure.as_ref().map_or("no reason", |f| f.reason.as_str());
             lines.push(format!("{}: failed. {reason}", robot.name));
-            for (pose, name) in [(&scene.start, "start"), (&scene.goal, "goal")] {
-                view.end(robot, placed(pose), &posture(pose, robot), name);
-            }
+            place::ends(&mut view, robot, [Some(&scene.start), Some(&scene.goal)]);
         }
     }
     let title = match suite {
@@ -82,25 +75,4 @@ pub fn picture(
     };
     let panels = std::iter::once(Panel::Top(view)).chain(charts.into_iter().map(Panel::Chart)).collect();
     Ok(Figure { title, lines, panels }.to_svg())
-}
-
-fn placed(pose: &PoseSpec) -> Pose2 {
-    let part = |value: Option<f64>| value.unwrap_or(0.0);
-    Pose2::new(part(pose.x), part(pose.y), part(pose.yaw))
-}
-
-/// The joints given; others at the middle of what they can hold.
-fn posture(pose: &PoseSpec, robot: &RobotModel) -> Vec<f64> {
-    let rest = |low: f64, high: f64| if low.is_finite() && high.is_finite() { 0.5 * (low + high) } else { 0.0 };
-    robot.joints.iter().map(|j| pose.joints.get(&j.name).copied().unwrap_or(rest(j.lower, j.upper))).collect()
-}
-
-/// Height of the robot at its lowest, m, all joints moved alike through their ranges: what hangs higher can be passed under.
-fn least_top(robot: &RobotModel) -> f64 {
-    let at = |k: usize| {
-        let share = k as f64 / (POSTURES - 1) as f64;
-        let value = |low: f64, high: f64| if (high - low).is_finite() { low + share * (high - low) } else { 0.0 };
-        top(robot, &robot.joints.iter().map(|j| value(j.lower, j.upper)).collect::<Vec<_>>())
-    };
-    (0..POSTURES).map(at).fold(f64::INFINITY, f64::min)
 }

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::{figure_tables, paper};
 use super::statistics::{Summary, mean, mean_metrics};
 use super::text_table::{TextTable, fixed};
 use super::{AlphaExcess, Judged, Suite};
+use super::{figure_tables, paper};
 use crate::report::Metrics;
 
 /// More different numbers of boxes than this are one row of Table III.

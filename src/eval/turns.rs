@@ -26,7 +26,8 @@ impl Turns {
     /// Of these commands.
     pub fn of(table: &CommandTable) -> Self {
         let dt = table.sampling_time;
-        let held: Vec<(f64, f64)> = (0..table.rows.len()).map(|k| table.twist(k)).map(|(v, w)| (v * dt, w * dt)).collect();
+        let held: Vec<(f64, f64)> =
+            (0..table.rows.len()).map(|k| table.twist(k)).map(|(v, w)| (v * dt, w * dt)).collect();
         let spins = |(travel, turn): (f64, f64)| turn.abs() > 1e-6 && travel.abs() < ON_THE_SPOT * turn.abs();
         let mut on_the_spot = 0;
         for run in held.split(|row| !spins(*row)) {

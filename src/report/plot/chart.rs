@@ -102,7 +102,9 @@ impl Chart {
         let points = || self.series.iter().flat_map(|s| &s.points).filter(|p| p.iter().all(|v| v.is_finite()));
         let x = match self.x_spread {
             Spread::Linear => {
-                let (low, high) = points().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p[0]), h.max(p[0])));
+                // Where a line has gaps the axis goes on: charts below each other share it.
+                let all = self.series.iter().flat_map(|s| &s.points).map(|p| p[0]).filter(|x| x.is_finite());
+                let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
                 if low > high { Scale::exactly(0.0, 1.0) } else { Scale::exactly(low, high) }
             }
             Spread::Logarithmic => Scale::around(points().map(|p| p[0]), Spread::Logarithmic),
@@ -184,7 +186,7 @@ pub(super) fn axes(svg: &mut Svg, inner: Area, scales: [&Scale; 2], labels: [&st
         svg.line([at, inner.y], [at, inner.bottom()], &Paint::line(FAINT, 1.0));
         svg.text([at, inner.bottom() + 14.0], &text, &small.anchored(Anchor::Middle));
     }
-    for (value, text) in y.ticks((inner.height / 28.0).max(2.0) as usize) {
+    for (value, text) in y.ticks((inner.height / if inner.height > 300.0 { 50.0 } else { 28.0 }).max(2.0) as usize) {
         let at = inner.bottom() - y.share(value) * inner.height;
         svg.line([inner.x, at], [inner.right(), at], &Paint::line(FAINT, 1.0));
         svg.text([inner.x - 6.0, at + 4.0], &text, &small.anchored(Anchor::End));

@@ -6,6 +6,7 @@
 mod chart;
 pub mod motion;
 mod outline;
+pub mod place;
 mod scale;
 pub mod svg;
 mod top_view;

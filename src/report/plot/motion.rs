@@ -6,7 +6,7 @@ use crate::geom::Pose2;
 use crate::robot::RobotModel;
 
 /// About so many outlines are drawn along a motion.
-const OUTLINES: f64 = 40.0;
+const OUTLINES: f64 = 30.0;
 /// Every so many outlines the time is written.
 const LABELLED: usize = 5;
 
@@ -28,7 +28,7 @@ pub fn draw(view: &mut TopView, robot: &RobotModel, table: &CommandTable) {
     view.path(states.iter().map(|(pose, _)| [pose.x, pose.y]).collect(), "path of the base");
     for (k, (pose, _)) in states.iter().enumerate().step_by(every * LABELLED).skip(1) {
         if k + 2 * every < states.len() {
-            view.note([pose.x, pose.y], format!("{:.0} s", table.time(k)));
+            view.note([pose.x, pose.y], format!("{} s", (10.0 * table.time(k)).round() / 10.0));
         }
     }
     view.end(robot, first.0, first.1, "start");
@@ -60,7 +60,8 @@ pub fn joint_charts(table: &CommandTable, robot: Option<&RobotModel>) -> Vec<Cha
     let chart = |(j, (name, prismatic)): (usize, &(String, bool))| {
         let points = table.rows.iter().enumerate().map(|(k, row)| [table.time(k), row.joint_positions[j]]).collect();
         let unit = if *prismatic { "m" } else { "rad" };
-        let mut chart = Chart::new(format!("Joint {name}"), "time s", format!("position {unit}")).line("", points, Join::Straight);
+        let mut chart =
+            Chart::new(format!("Joint {name}"), "time s", format!("position {unit}")).line("", points, Join::Straight);
         if let Some(joint) = robot.and_then(|r| r.joints.iter().find(|own| own.name == *name)) {
             for (end, value) in [("upper limit", joint.upper), ("lower limit", joint.lower)] {
                 if value.is_finite() {

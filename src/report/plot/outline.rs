@@ -147,7 +147,10 @@ mod tests {
 
     #[test]
     fn a_block_is_four_corners_and_a_ring_two_outlines() {
-        assert_eq!(of_cells([7, 7], |i, j| (2..5).contains(&i) && (1..4).contains(&j)), [[[2, 1], [5, 1], [5, 4], [2, 4]]]);
+        assert_eq!(
+            of_cells([7, 7], |i, j| (2..5).contains(&i) && (1..4).contains(&j)),
+            [[[2, 1], [5, 1], [5, 4], [2, 4]]]
+        );
         assert_eq!(of_cells([3, 3], |i, j| [i, j] != [1, 1]).len(), 2);
         assert!(of_cells([3, 3], |_, _| false).is_empty());
     }

@@ -64,8 +64,15 @@ impl Scale {
             }
             Spread::Logarithmic => {
                 let powers = |v: f64, round: fn(f64) -> f64| round(v.log10()) as i32;
-                let (first, last) = (powers(self.low * (1.0 - 1e-9), f64::ceil), powers(self.high * (1.0 + 1e-9), f64::floor));
-                let text = |k: i32| if k < 0 { format!("{:.*}", k.unsigned_abs() as usize, 10f64.powi(k)) } else { format!("{:.0}", 10f64.powi(k)) };
+                let (first, last) =
+                    (powers(self.low * (1.0 - 1e-9), f64::ceil), powers(self.high * (1.0 + 1e-9), f64::floor));
+                let text = |k: i32| {
+                    if k < 0 {
+                        format!("{:.*}", k.unsigned_abs() as usize, 10f64.powi(k))
+                    } else {
+                        format!("{:.0}", 10f64.powi(k))
+                    }
+                };
                 (first..=last).map(|k| (10f64.powi(k), text(k))).collect()
             }
         }
@@ -90,7 +97,10 @@ mod tests {
     fn ticks_are_round_and_within() {
         assert_eq!(texts(Scale::exactly(0.0, 10.0), 5), ["0", "2", "4", "6", "8", "10"]);
         assert_eq!(texts(Scale::exactly(-0.13, 0.32), 5), ["-0.1", "0.0", "0.1", "0.2", "0.3"]);
-        assert_eq!(texts(Scale { low: 0.01, high: 100.0, spread: Spread::Logarithmic }, 5), ["0.01", "0.1", "1", "10", "100"]);
+        assert_eq!(
+            texts(Scale { low: 0.01, high: 100.0, spread: Spread::Logarithmic }, 5),
+            ["0.01", "0.1", "1", "10", "100"]
+        );
     }
 
     #[test]

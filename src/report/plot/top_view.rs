@@ -63,10 +63,8 @@ impl TopView {
             let word = words.iter().position(|w| *w != 0)?;
             Some(map.origin[2] + map.resolution * (64 * word + words[word].trailing_zeros() as usize) as f64)
         };
-        let kinds: [(&'static str, &'static str, &dyn Fn(f64) -> bool); 2] = [
-            ("overhead", OVERHEAD, &|z| z >= under - 1e-9),
-            ("obstacle", OBSTACLE, &|z| z < under - 1e-9),
-        ];
+        let kinds: [(&'static str, &'static str, &dyn Fn(f64) -> bool); 2] =
+            [("overhead", OVERHEAD, &|z| z >= under - 1e-9), ("obstacle", OBSTACLE, &|z| z < under - 1e-9)];
         for (name, colour, of_kind) in kinds {
             let loops = outline::of_cells(dims, |i, j| lowest(i, j).is_some_and(of_kind));
             let metres = |c: [usize; 2]| [0, 1].map(|a| map.origin[a] + map.resolution * c[a] as f64);
@@ -87,7 +85,8 @@ impl TopView {
     /// The robot's outline at a pose with joint values `q`: base and what joints move in two colours.
     pub fn robot(&mut self, robot: &RobotModel, pose: Pose2, q: &[f64]) {
         for Part { outline, fixed } in outline::of_robot(robot, pose, q) {
-            let (colour, opacity, name) = if fixed { (COLOURS[0], 0.10, "base") } else { (COLOURS[1], 0.22, "moved by joints") };
+            let (colour, opacity, name) =
+                if fixed { (COLOURS[0], 0.10, "base") } else { (COLOURS[1], 0.22, "moved by joints") };
             let paint = Paint::line(colour, 0.8).tinted(colour, opacity);
             self.add(Item::Outlines(vec![outline], paint), paint, name);
         }
@@ -96,7 +95,8 @@ impl TopView {
     /// The robot's outline at an end of the way, drawn strongly, with an arrow ahead and a name.
     pub fn end(&mut self, robot: &RobotModel, pose: Pose2, q: &[f64], name: &str) {
         let parts = outline::of_robot(robot, pose, q);
-        let reach = parts.iter().flat_map(|p| &p.outline).map(|p| (p[0] - pose.x).hypot(p[1] - pose.y)).fold(0.1, f64::max);
+        let reach =
+            parts.iter().flat_map(|p| &p.outline).map(|p| (p[0] - pose.x).hypot(p[1] - pose.y)).fold(0.1, f64::max);
         let paint = Paint::line(INK, 1.6);
         self.items.extend(parts.into_iter().map(|p| Item::Outlines(vec![p.outline], paint)));
         let ahead = |d: f64, side: f64| {
@@ -143,7 +143,8 @@ impl TopView {
         let inner = Area { x: room.x + 0.5 * (room.width - width), width, height, ..room };
         let [x, y] = [0, 1].map(|a| Scale::exactly(self.low[a], self.high[a]));
         axes(svg, inner, [&x, &y], ["x m", "y m"]);
-        let place = |p: [f64; 2]| [inner.x + scale * (p[0] - self.low[0]), inner.bottom() - scale * (p[1] - self.low[1])];
+        let place =
+            |p: [f64; 2]| [inner.x + scale * (p[0] - self.low[0]), inner.bottom() - scale * (p[1] - self.low[1])];
         let placed = |points: &[[f64; 2]]| -> Vec<[f64; 2]> { points.iter().copied().map(place).collect() };
         svg.within(inner, |svg| {
             for item in &self.items {
@@ -202,5 +203,63 @@ impl TopView {
             svg.text([x + 24.0, inner.y - 9.5], name, &Lettering::of(SMALL).coloured(GREY));
             x += 24.0 + text_width(name, SMALL) + 18.0;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mission::Unknown;
+
+    /// A floor of 2 x 1 m with a block on it and a bar one cell thick, 0.45 m above.
+    fn view() -> TopView {
+        let mut map = VoxelMap::new(0.05, [0.0; 3], [40, 20, 12], Unknown::Occupied);
+        (0..4).for_each(|k| map.occupy([3, 5, k]));
+        (0..20).for_each(|j| map.occupy([20, j, 9]));
+        TopView::of_map(&map, 0.3)
+    }
+
+    fn drawn(view: &TopView) -> String {
+        let mut svg = Svg::new(600.0, view.height(600.0), "view");
+        view.draw(&mut svg, Area { x: 0.0, y: 0.0, width: 600.0, height: view.height(600.0) });
+        svg.finish()
+    }
+
+    #[test]
+    fn what_hangs_overhead_is_drawn_apart_from_what_stands_on_the_floor() {
+        let text = drawn(&view());
+        let tree = roxmltree::Document::parse(&text).expect("well-formed");
+        let path = |colour: &str| {
+            let of_colour = |n: &roxmltree::Node<'_, '_>| n.has_tag_name("path") && n.attribute("fill") == Some(colour);
+            tree.descendants().filter(of_colour).filter_map(|n| n.attribute("d")).collect::<Vec<_>>()
+        };
+        // 522 px for 2 m: the bar is 13.05 wide over the whole depth, the block as wide and as deep.
+        assert_eq!(path(OVERHEAD), ["M325,287 338.05,287 338.05,26 325,26Z"]);
+        assert_eq!(path(OBSTACLE), ["M103.15,221.75 116.2,221.75 116.2,208.7 103.15,208.7Z"]);
+    }
+
+    #[test]
+    fn notes_keep_off_each_other_and_within_the_frame() {
+        let mut view = view();
+        for name in ["here", "here too", "and here"] {
+            view.note([1.99, 0.5], name);
+        }
+        let text = drawn(&view);
+        let tree = roxmltree::Document::parse(&text).expect("well-formed");
+        let at = |name: &str| {
+            let node = tree.descendants().find(|n| n.text() == Some(name) && n.has_tag_name("text")).expect("drawn");
+            ["x", "y"].map(|a| node.attribute(a).and_then(|v| v.parse::<f64>().ok()).expect("a number"))
+        };
+        let [a, b, c] = ["here", "here too", "and here"].map(at);
+        assert!((a[1] - b[1]).abs() > SMALL && (a[1] - c[1]).abs() > SMALL && (b[1] - c[1]).abs() > SMALL);
+        assert!([a, b, c].iter().all(|p| p[0] < 586.0));
+    }
+
+    #[test]
+    fn a_view_of_no_points_is_drawn_too() {
+        let empty = TopView::around(std::iter::empty(), 0.0);
+        assert!(roxmltree::Document::parse(&drawn(&empty)).is_ok());
+        let line = TopView::around([[0.0, 0.0], [3.0, 0.0], [f64::NAN, 1.0]].into_iter(), 0.5);
+        assert!(line.height(800.0) > 100.0 && line.height(800.0).is_finite());
     }
 }
