@@ -96,7 +96,7 @@ fn fig_five_stands_beside_the_papers_radius_and_a_failure_has_no_figures() {
     let turns = super::super::Turns { on_the_spot: 2, least_driven_m: Some(0.0123), tightest: None };
     let usual = Judged { turns: Some(turns), ..scene("fig5", 30, 6.0, 1.1) };
     let failed = Judged { certified: false, ..usual.clone() };
-    let text = render(Some(Suite::Fig5), &[usual.clone()], &[vec![failed], vec![usual]]);
+    let text = render(Some(Suite::Fig5), std::slice::from_ref(&usual), &[vec![failed], vec![usual.clone()]]);
     let row = |name: &str| text.lines().find(|l| l.trim().starts_with(name)).unwrap_or_default().to_owned();
     assert!(row("paper").ends_with("9.3") && row("limits allow").ends_with("4.0"), "{text}");
     assert!(row("ours, one curve, without DS").ends_with("failed"), "{text}");

@@ -63,9 +63,8 @@ impl TopView {
             let word = words.iter().position(|w| *w != 0)?;
             Some(map.origin[2] + map.resolution * (64 * word + words[word].trailing_zeros() as usize) as f64)
         };
-        let kinds: [(&'static str, &'static str, &dyn Fn(f64) -> bool); 2] =
-            [("overhead", OVERHEAD, &|z| z >= under - 1e-9), ("obstacle", OBSTACLE, &|z| z < under - 1e-9)];
-        for (name, colour, of_kind) in kinds {
+        for (name, colour, overhead) in [("overhead", OVERHEAD, true), ("obstacle", OBSTACLE, false)] {
+            let of_kind = |z: f64| (z >= under - 1e-9) == overhead;
             let loops = outline::of_cells(dims, |i, j| lowest(i, j).is_some_and(of_kind));
             let metres = |c: [usize; 2]| [0, 1].map(|a| map.origin[a] + map.resolution * c[a] as f64);
             let loops: Vec<Vec<[f64; 2]>> = loops.into_iter().map(|l| l.into_iter().map(metres).collect()).collect();
