@@ -117,9 +117,68 @@ pub fn first() -> Vec<u8> {
     text.into_bytes()
 }
 
+/// The site's sides, cells: 5 x 6 m.
+const SITE: [u32; 2] = [100, 120];
+/// Boxes of the site: x, y of the corner and the edge, in cells. Two rows across the site have
+/// one gap of 0.5 m each and at most 0.1 m elsewhere.
+const BOXES: [[u32; 3]; 25] = [
+    [42, 5, 8],
+    [88, 6, 10],
+    [0, 24, 12],
+    [13, 24, 12],
+    [26, 24, 12],
+    [40, 24, 12],
+    [54, 24, 12],
+    [76, 24, 12],
+    [88, 24, 12],
+    [12, 38, 8],
+    [84, 39, 8],
+    [6, 64, 10],
+    [24, 61, 10],
+    [56, 60, 12],
+    [86, 62, 10],
+    [0, 82, 10],
+    [12, 82, 10],
+    [24, 82, 10],
+    [44, 82, 10],
+    [55, 82, 10],
+    [66, 82, 10],
+    [78, 82, 10],
+    [90, 82, 10],
+    [16, 106, 8],
+    [82, 94, 8],
+];
+/// Tapes of the site, one cell thick: across the whole site along x, 0.45 m above the floor; and along y behind the second row, 0.40 m
+/// above the floor.
+const TAPES: [Block; 2] = [[[0, 100], [52, 53], [9, 10]], [[60, 61], [92, 120], [8, 9]]];
+
+/// `maps/site.ply`: like the site of \[SCR\] section VI-C, of which the paper states size and kind: 5 x 6 m, square obstacles, and tapes
+/// that limit the height. Floor points (z = 0) on every fourth cell.
+pub fn site() -> Vec<u8> {
+    let mut points: Vec<[f64; 3]> = Vec::new();
+    let every_fourth = |cells: u32| (0..cells).step_by(4).chain([cells - 1]);
+    points.extend(every_fourth(SITE[0]).flat_map(|i| every_fourth(SITE[1]).map(move |j| [middle(i), middle(j), 0.0])));
+    let boxes = BOXES.map(|[x, y, edge]| [[x, x + edge], [y, y + edge], [0, edge]]);
+    for [x, y, z] in boxes.into_iter().chain(TAPES) {
+        for i in x[0]..x[1] {
+            for j in y[0]..y[1] {
+                points.extend((z[0]..z[1]).map(|k| [middle(i), middle(j), middle(k)]));
+            }
+        }
+    }
+    let mut file = format!(
+        "ply\nformat binary_little_endian 1.0\ncomment a site of 5 x 6 m with boxes and tapes; made by examples/generate_maps.rs\n\
+         element vertex {}\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
+        points.len()
+    )
+    .into_bytes();
+    file.extend(points.iter().flatten().flat_map(|c| (*c as f32).to_le_bytes()));
+    file
+}
+
 /// Everything, by file name.
-pub fn all() -> [(&'static str, Vec<u8>); 2] {
-    [("arch_bridges.pcd", arch_bridges()), ("first.csv", first())]
+pub fn all() -> [(&'static str, Vec<u8>); 3] {
+    [("arch_bridges.pcd", arch_bridges()), ("first.csv", first()), ("site.ply", site())]
 }
 
 #[allow(dead_code)] // not called where a test includes this file

@@ -73,11 +73,13 @@ pub struct CompileOptions {
     pub parameterisation: Option<Parameterisation>,
     /// Dense sampling in the optimiser (\[SCR\] section IV-C). Default true.
     pub dense: bool,
+    /// Turns that are better made on the spot stay so. False: every turn is part of a smooth curve, as in \[SCR\]. Default true.
+    pub spins: bool,
 }
 
 impl Default for CompileOptions {
     fn default() -> Self {
-        Self { sampling_time: None, parameterisation: None, dense: true }
+        Self { sampling_time: None, parameterisation: None, dense: true, spins: true }
     }
 }
 
@@ -220,9 +222,8 @@ struct Made {
 }
 
 /// Searches and optimises until something is certified; the search's own path is the last try.
-fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, options: &CompileOptions) -> Result<Made, Diagnostics> {
-    let parameterisation = options.parameterisation.unwrap_or(finish.mission.parameterisation);
-    let dense = options.dense;
+fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, compile: &CompileOptions) -> Result<Made, Diagnostics> {
+    let asked = compile.parameterisation.unwrap_or(finish.mission.parameterisation);
     let (mission, robot) = (finish.mission, finish.robot);
     let field = run.stage("esdf", || esdf::build(map));
     let query = query(mission, robot);
@@ -240,9 +241,13 @@ fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, options: &Compil
     if path.length() == 0.0 {
         return finish.certify(run, path.trajectory());
     }
-    for margin in OPTIMISER_MARGINS {
+    // Where one parameterisation fails at every margin, the other may not.
+    let other = (asked == Parameterisation::ArcLength).then_some(Parameterisation::Flat);
+    let tries = [asked].into_iter().chain(other).flat_map(|p| OPTIMISER_MARGINS.map(|margin| (p, margin)));
+    for (parameterisation, margin) in tries {
+        let usual = if compile.spins { OptimizeOptions::default() } else { OptimizeOptions::without_spins() };
         let clearance = mission.clearance + margin;
-        let options = OptimizeOptions { parameterisation, clearance, dense, ..Default::default() };
+        let options = OptimizeOptions { parameterisation, clearance, dense: compile.dense, ..usual };
         let trajectory = run.stage("optimize", || optimize::optimize(&path, &field, robot, &options));
         // A trajectory that no law can time is one more reason to go on to the next try.
         if let Some(made) = finish.certify(run, trajectory).ok().filter(|made| made.certificate.holds()) {

@@ -119,6 +119,52 @@ fn a_parameterisation_is_taken_for_all_scenes() {
 }
 
 #[test]
+fn figures_five_and_six_are_compiled_drawn_and_stand_beside_the_paper() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let table = |suite: &str, more: &[&str]| {
+        let args: Vec<&str> = ["--suite", suite].iter().chain(more).copied().collect();
+        let output = eval(&args, folder.path());
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        text(&output.stdout)
+    };
+    let picture =
+        |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let six = table("fig6", &[]);
+    for expected in ["Fig. 6", "wheel_left", "blade", "1 of 1 certified", "picture: out/fig6.svg"] {
+        assert!(six.contains(expected), "{expected} in {six}");
+    }
+    let first = picture("out/fig6.svg");
+    table("fig6", &["--plot", "again"]);
+    assert!(first == picture("again/fig6.svg"), "the same scene gives the same bytes");
+    let tree = roxmltree::Document::parse(&first).expect("well-formed");
+    let texts: Vec<&str> = tree.descendants().filter(|n| n.has_tag_name("text")).filter_map(|n| n.text()).collect();
+    for expected in
+        ["overhead", "obstacle", "start", "goal", "x m", "y m", "Joint blade", "position rad", "rim speed m/s"]
+    {
+        assert!(texts.contains(&expected), "{expected} in {texts:?}");
+    }
+    let five = table("fig5", &[]);
+    for expected in ["9.3", "ours, one curve, without DS", "ours, one curve, with DS", "ours, as usual"] {
+        assert!(five.contains(expected), "{expected} in {five}");
+    }
+    for name in ["out/fig5.svg", "out/fig5-spins.svg"] {
+        assert!(five.contains(&format!("picture: {name}")), "{five}");
+        let file = picture(name);
+        assert!(roxmltree::Document::parse(&file).is_ok() && file.contains("radius mm"));
+    }
+}
+
+#[test]
+fn a_scene_that_failed_is_drawn_with_its_reason() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("s.json"), SCENES).expect("written");
+    let output = eval(&["--scenes", "s.json", "--robot", ROBOT, "--plot", "p"], folder.path());
+    assert!(text(&output.stdout).contains("picture: p/around.svg"), "{}", text(&output.stdout));
+    let blocked = std::fs::read_to_string(folder.path().join("p/blocked.svg")).expect("drawn");
+    assert!(blocked.contains("failed.") && blocked.contains(">start<") && !blocked.contains("path of the base"));
+}
+
+#[test]
 fn bad_input_ends_with_two_and_says_what_to_do() {
     let folder = tempfile::tempdir().expect("a folder");
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("written");
@@ -134,6 +180,9 @@ fn bad_input_ends_with_two_and_says_what_to_do() {
         (&["--suite", "table1", "--parameterisation", "arclength"], "arc_length"),
         (&["--suite", "table1", "--scenes", "good.json"], "cannot be used with"),
         (&["--suite", "table1", "--boxes", "10"], "`--boxes` is for table3"),
+        (&["--suite", "fig5", "--seed", "2"], "fig5 is one fixed scene"),
+        (&["--suite", "fig6", "--count", "3"], "fig6 is one fixed scene"),
+        (&["--suite", "fig6", "--plot", "good.json"], "cannot make folder `good.json`"),
         (&["--suite", "table3", "--boxes", "0"], "1..=60"),
         (&["--suite", "table3", "--count", "0"], "1..=5000"),
         (&["--scenes", "none.json"], "no such file: `none.json`"),

@@ -23,7 +23,7 @@ use crate::robot::{self, Files, RobotInputs, RobotModel, spec};
 #[derive(Debug, clap::Args)]
 #[command(group(clap::ArgGroup::new("what").required(true).args(["suite", "scenes"])))]
 pub struct EvalArgs {
-    /// Draw the scenes of this table of [SCR].
+    /// Draw the scenes of this table of [SCR]; fig5 and fig6: the one scene of a figure.
     #[arg(long)]
     suite: Option<Suite>,
     /// Read the scenes from a file.
@@ -35,9 +35,9 @@ pub struct EvalArgs {
     /// Scenes for each number of boxes [default: the paper's 500 or 200]; of a file: the first N [default: all].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=5000))]
     count: Option<u32>,
-    /// Seed of a suite.
-    #[arg(long, value_name = "SEED", default_value_t = 1, conflicts_with = "scenes")]
-    seed: u64,
+    /// Seed of a suite [default: 1].
+    #[arg(long, value_name = "SEED", conflicts_with = "scenes")]
+    seed: Option<u64>,
     /// Boxes a scene, for table3 [default: 10,20,35].
     #[arg(long, value_name = "N", value_delimiter = ',', conflicts_with = "scenes",
           value_parser = clap::value_parser!(u16).range(1..=60))]
@@ -51,6 +51,10 @@ pub struct EvalArgs {
     /// Write DIR/ID/commands.csv and report.json of each certified scene.
     #[arg(long, value_name = "DIR")]
     write_commands: Option<PathBuf>,
+    /// Draw each scene as DIR/ID.svg: from above, obstacles, path and robot; below, joints and wheels over time [default: out for
+    /// fig5 (fig5.svg, and fig5-spins.svg with turns on the spot) and fig6 (fig6.svg); nothing is drawn for others].
+    #[arg(long, value_name = "DIR")]
+    plot: Option<PathBuf>,
     /// Print the milliseconds of each stage too.
     #[arg(long)]
     profile: bool,
@@ -76,15 +80,25 @@ pub fn eval(args: &EvalArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics>
     let loaded = Loaded::read(args, &set, suite, &disk)?;
     set.fits(&loaded.robot)?;
     if let Some(path) = &args.write_scenes {
-        write_file(path, text.text.as_bytes())?;
+        output::write_file(path, text.text.as_bytes())?;
     }
     let writer = args.write_commands.as_deref().map(|folder| Writer::new(folder, &set, &text, &loaded));
-    let runs = if suite == Some(Suite::Table2) { 2 } else { 1 };
-    let bar = progress(terminal, runs * set.scenes.len());
-    let run = |dense: bool, writer: Option<&Writer<'_>>| -> Result<Vec<Judged>, Diagnostics> {
-        let options = CompileOptions { dense, parameterisation: args.parameterisation, ..Default::default() };
+    let variants = suite.map_or(Vec::new(), Suite::variants);
+    let bar = progress(terminal, (1 + variants.len()) * set.scenes.len());
+    let plots = args.plot.clone().or_else(|| suite.filter(|s| s.is_figure()).map(|_| PathBuf::from("out")));
+    if let Some(folder) = &plots {
+        output::make_folder(folder)?;
+    }
+    let mut drawn = Vec::new();
+    let mut run = |options: &CompileOptions, writer: Option<&Writer<'_>>| -> Result<Vec<Judged>, Diagnostics> {
         let judge = |scene| {
-            let (judged, outcome) = eval::judge(&set, scene, &loaded.robot, &options)?;
+            let (judged, outcome) = eval::judge(&set, scene, &loaded.robot, options)?;
+            if let Some((folder, name)) = plots.as_deref().zip(eval::picture_name(scene, suite, options)) {
+                let path = folder.join(name);
+                let picture = eval::picture(&set, scene, suite, &loaded.robot, &outcome)?;
+                output::write_file(&path, picture.as_bytes())?;
+                drawn.push(path);
+            }
             if let Some(writer) = writer {
                 writer.write(&judged, outcome)?;
             }
@@ -93,14 +107,20 @@ pub fn eval(args: &EvalArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics>
         };
         set.scenes.iter().map(judge).collect()
     };
-    let judged = run(true, writer.as_ref())?;
-    let without_dense = if runs == 2 { run(false, None)? } else { Vec::new() };
+    let usual = CompileOptions { parameterisation: args.parameterisation, ..Default::default() };
+    let judged = run(&usual, writer.as_ref())?;
+    let variants = variants.iter().map(|options| run(options, None)).collect::<Result<Vec<_>, _>>()?;
     bar.finish_and_clear();
     if args.json {
-        terminal.print(&figures::document(&set, suite, &judged, &without_dense));
+        terminal.print(&figures::document(&set, suite, &judged, &variants));
         return Ok(0);
     }
-    let mut out = tables::render(suite, &judged, &without_dense) + "\n" + &tables::render_totals(&judged);
+    let mut out = tables::render(suite, &judged, &variants) + "\n" + &tables::render_totals(&judged);
+    match &drawn[..] {
+        [] => {}
+        few if few.len() <= 4 => few.iter().for_each(|path| out += &format!("picture: {}\n", path.display())),
+        many => out += &format!("pictures: {} in {}\n", many.len(), plots.unwrap_or_default().display()),
+    }
     if args.profile {
         out += &format!("\n{}", tables::render_profile(&judged));
     }
@@ -127,7 +147,7 @@ fn scenes(args: &EvalArgs, disk: &Disk) -> Result<(SceneSet, TextFile), Diagnost
             let suite = suite.unwrap_or(Suite::Table1);
             let name = match &args.write_scenes {
                 Some(path) => path.display().to_string(),
-                None => format!("{} --seed {}", suite.name(), args.seed),
+                None => format!("{} --seed {}", suite.name(), args.seed.unwrap_or(1)),
             };
             TextFile { name, text: generate(args, suite, count.unwrap_or(eval::default_count(suite)))? }
         }
@@ -140,6 +160,10 @@ fn scenes(args: &EvalArgs, disk: &Disk) -> Result<(SceneSet, TextFile), Diagnost
 }
 
 fn generate(args: &EvalArgs, suite: Suite, count: usize) -> Result<String, Diagnostics> {
+    if suite.is_figure() && (args.seed.is_some() || args.count.is_some()) {
+        let message = format!("{} is one fixed scene: there is nothing to count or to draw", suite.name());
+        return Err(Diagnostic::error("eval/fixed", message).hint("leave `--count` and `--seed` out").into());
+    }
     if !args.boxes.is_empty() && suite != Suite::Table3 {
         let message = format!("`--boxes` is for table3; {} has its own number", suite.name());
         return Err(Diagnostic::error("eval/boxes", message).hint("leave `--boxes` out").into());
@@ -148,7 +172,7 @@ fn generate(args: &EvalArgs, suite: Suite, count: usize) -> Result<String, Diagn
     boxes.sort_unstable();
     boxes.dedup();
     let boxes = if boxes.is_empty() { eval::default_boxes(suite) } else { &boxes };
-    eval::document(suite, boxes, count, args.seed).map_err(|boxes| {
+    eval::document(suite, boxes, count, args.seed.unwrap_or(1)).map_err(|boxes| {
         let message = format!("found no room for {boxes} boxes and a way between them");
         Diagnostic::error("eval/boxes", message).hint("ask for fewer with `--boxes`").into()
     })
@@ -169,7 +193,7 @@ impl Loaded {
                 let path = robot_file(path)?;
                 (path.display().to_string(), inputs::read_robot_files(&path, disk, None)?)
             }
-            (None, Some(Suite::Table1)) => built_in(&SCR_DB)?,
+            (None, Some(suite)) if suite.has_blades() => built_in(&SCR_DB)?,
             (None, Some(_)) => built_in(&BOX_BASE)?,
             (None, None) => {
                 let message = "these scenes belong to no suite by their `name`, so they need `--robot`";
@@ -227,13 +251,6 @@ fn progress(terminal: &Terminal, scenes: usize) -> ProgressBar {
     let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} scenes, {eta} left");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     bar
-}
-
-fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Diagnostics> {
-    std::fs::write(path, bytes).map_err(|error| {
-        let message = format!("cannot write `{}`: {error}", path.display());
-        Diagnostic::error("output/io", message).hint("the folder must exist and be writable").into()
-    })
 }
 
 /// Writes commands and reports of certified scenes, and removes older ones of those that failed.

@@ -2,14 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use super::check::read_commands;
+use super::check::{mission_of, read_commands};
 use super::inputs::{self, Disk, read_map_file, read_robot_files};
+use super::plot;
 use super::terminal::Terminal;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::map::{self, MapInputs};
 use crate::mission::{LimitsSpec, MapSpec, Unknown};
 use crate::pipeline;
 use crate::report::metrics;
+use crate::report::plot::Figure;
 use crate::robot::{self, RobotInputs};
 
 /// Print what the program understood of a URDF, robot.yaml, map, mission or command file.
@@ -23,7 +25,13 @@ pub struct InspectArgs {
     /// Slab of a map that holds obstacles, in metres.
     #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', allow_hyphen_values = true, default_values_t = [0.02, 2.0])]
     height: Vec<f64>,
+    /// Draw it too: from above; of commands, wheels and joints over time.
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
 }
+
+/// What is printed, and what is drawn.
+type Understood = (String, Figure);
 
 /// What a .yaml is, by its keys.
 enum YamlKind {
@@ -39,7 +47,7 @@ enum YamlKind {
 pub fn inspect(args: &InspectArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics> {
     let path = args.file.as_path();
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    let text = match ending.as_str() {
+    let (text, figure) = match ending.as_str() {
         "urdf" => of_robot(path)?,
         "mcap" => of_commands(path)?,
         "csv" if starts_as_commands(path)? => of_commands(path)?,
@@ -50,6 +58,9 @@ pub fn inspect(args: &InspectArgs, terminal: &mut Terminal) -> Result<u8, Diagno
         },
         _ => of_map(args, path)?,
     };
+    if let Some(path) = &args.plot {
+        super::output::write_file(path, figure.to_svg().as_bytes())?;
+    }
     terminal.print(&text);
     Ok(0)
 }
@@ -73,7 +84,7 @@ fn starts_as_commands(path: &Path) -> Result<bool, Diagnostics> {
     Ok(head.contains("# format: trajc.commands") || head.contains("wheel_left_rad_s"))
 }
 
-fn of_robot(path: &Path) -> Result<String, Diagnostics> {
+fn of_robot(path: &Path) -> Result<Understood, Diagnostics> {
     let disk = Disk::default();
     let (spec, _, urdf) = read_robot_files(path, &disk, None)?;
     let overrides = LimitsSpec::default();
@@ -84,10 +95,10 @@ fn of_robot(path: &Path) -> Result<String, Diagnostics> {
         files: &mut files,
         overrides: &overrides,
     })?;
-    Ok(robot.describe())
+    Ok((robot.describe(), plot::robot(&robot)))
 }
 
-fn of_map(args: &InspectArgs, path: &Path) -> Result<String, Diagnostics> {
+fn of_map(args: &InspectArgs, path: &Path) -> Result<Understood, Diagnostics> {
     let height = match args.height[..] {
         [low, high] if low.is_finite() && high.is_finite() && low < high => [low, high],
         _ => {
@@ -109,10 +120,10 @@ fn of_map(args: &InspectArgs, path: &Path) -> Result<String, Diagnostics> {
     };
     let beside = file.beside.as_ref().map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
     let map = map::parse(&MapInputs { name: &file.name, bytes: &file.bytes, beside }, &spec, height[1])?;
-    Ok(map.describe())
+    Ok((map.describe(), plot::map(&file.name, &map)))
 }
 
-fn of_mission(path: &Path) -> Result<String, Diagnostics> {
+fn of_mission(path: &Path) -> Result<Understood, Diagnostics> {
     let (mut inputs, disk) = inputs::read(path)?;
     let world = pipeline::world(&mut inputs)?;
     let mission = &inputs.mission;
@@ -138,10 +149,11 @@ fn of_mission(path: &Path) -> Result<String, Diagnostics> {
         out += "\n";
         out += &map.describe();
     }
-    Ok(out)
+    let figure = plot::mission(mission, &world);
+    Ok((out, figure))
 }
 
-fn of_commands(path: &Path) -> Result<String, Diagnostics> {
+fn of_commands(path: &Path) -> Result<Understood, Diagnostics> {
     let file = read_commands(path)?;
     let table = &file.table;
     let driven = metrics::of_commands(table);
@@ -171,5 +183,8 @@ fn of_commands(path: &Path) -> Result<String, Diagnostics> {
             out += "\n";
         }
     }
-    Ok(out)
+    // Drawn with its mission's robot and map, where these are at hand.
+    let world = mission_of(path, &file.header, None).and_then(|(mut inputs, _)| pipeline::world(&mut inputs)).ok();
+    let figure = plot::commands(&path.display().to_string(), table, world.as_ref());
+    Ok((out, figure))
 }

@@ -9,6 +9,7 @@ pub mod inputs;
 pub mod inspect;
 pub mod output;
 pub mod path_error;
+mod plot;
 pub mod schema;
 pub mod terminal;
 

@@ -10,7 +10,7 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Component, Path, PathBuf};
 
-use crate::diag::{Describe, Diagnostic};
+use crate::diag::{Describe, Diagnostic, Diagnostics};
 pub use depfile::{depfile, spelled};
 
 /// Every file that this program writes into an output folder, command files first.
@@ -235,6 +235,28 @@ fn clear_leftovers(parent: &Path, mission: &str) {
         let _ = remove_ours(&folder);
         let _ = fs::remove_dir(&folder);
     }
+}
+
+/// Makes a folder and those above it.
+///
+/// # Errors
+/// It cannot be made.
+pub(super) fn make_folder(path: &Path) -> Result<(), Diagnostics> {
+    std::fs::create_dir_all(path).map_err(|error| {
+        let message = format!("cannot make folder `{}`: {error}", path.display());
+        Diagnostic::error("output/io", message).hint("the folder above must be writable").into()
+    })
+}
+
+/// Writes one file that belongs to no mission's folder.
+///
+/// # Errors
+/// It cannot be written.
+pub(super) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Diagnostics> {
+    std::fs::write(path, bytes).map_err(|error| {
+        let message = format!("cannot write `{}`: {error}", path.display());
+        Diagnostic::error("output/io", message).hint("the folder must exist and be writable").into()
+    })
 }
 
 #[cfg(test)]

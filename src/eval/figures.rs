@@ -15,10 +15,10 @@ pub fn metrics(suite: Option<Suite>, judged: &Judged) -> Option<Metrics> {
     shown.filter(|_| judged.certified)
 }
 
-/// The document. `without_dense`: the same scenes without dense sampling (Table II), else empty.
-pub fn document(set: &SceneSet, suite: Option<Suite>, judged: &[Judged], without_dense: &[Judged]) -> String {
+/// The document. `variants`: the same scenes compiled as [`Suite::variants`] says.
+pub fn document(set: &SceneSet, suite: Option<Suite>, judged: &[Judged], variants: &[Vec<Judged>]) -> String {
     let scenes: Vec<Value> = judged.iter().map(|j| scene(suite, j)).collect();
-    format!("{:#}\n", json!({"scenes": scenes, "totals": totals(set, suite, judged, without_dense)}))
+    format!("{:#}\n", json!({"scenes": scenes, "totals": totals(set, suite, judged, variants)}))
 }
 
 fn scene(suite: Option<Suite>, judged: &Judged) -> Value {
@@ -43,6 +43,7 @@ fn scene(suite: Option<Suite>, judged: &Judged) -> Value {
         "planned": judged.planned,
         "driven": judged.driven,
         "bound_s": judged.bound.1,
+        "turns": judged.turns,
     });
     if let (Some(failure), Value::Object(map)) = (&judged.failure, &mut scene) {
         map.insert("failure".into(), value(failure));
@@ -55,7 +56,7 @@ fn value(of: &impl Serialize) -> Value {
     serde_json::to_value(of).expect("plain structs")
 }
 
-fn totals(set: &SceneSet, suite: Option<Suite>, judged: &[Judged], without_dense: &[Judged]) -> Value {
+fn totals(set: &SceneSet, suite: Option<Suite>, judged: &[Judged], variants: &[Vec<Judged>]) -> Value {
     let certified = judged.iter().filter(|j| j.certified).count();
     let summary = |of: fn(&Judged) -> Option<f64>| value(&Summary::of(judged.iter().filter_map(of)));
     let shown = judged.iter().filter_map(|j| metrics(suite, j));
@@ -82,7 +83,7 @@ fn totals(set: &SceneSet, suite: Option<Suite>, judged: &[Judged], without_dense
         "by_boxes": rows.collect::<Vec<_>>(),
         "profile_ms": profile,
     });
-    if suite == Some(Suite::Table2) {
+    if let (Some(Suite::Table2), [without_dense]) = (suite, variants) {
         let excess = |judged: &[Judged], of: fn(&Judged) -> Option<AlphaExcess>| {
             let all: Vec<AlphaExcess> = judged.iter().filter(|j| j.certified).filter_map(of).collect();
             value(&ExcessRow::of(&all))
@@ -95,6 +96,10 @@ fn totals(set: &SceneSet, suite: Option<Suite>, judged: &[Judged], without_dense
             })
         };
         totals["alpha_excess_percent"] = json!({"dense": rows(judged), "sparse": rows(without_dense)});
+    }
+    if let (Some(Suite::Fig5), [sparse, dense]) = (suite, variants) {
+        let scenes = |judged: &[Judged]| judged.iter().map(|j| scene(suite, j)).collect::<Vec<_>>();
+        totals["one_curve"] = json!({"sparse": scenes(sparse), "dense": scenes(dense)});
     }
     totals
 }

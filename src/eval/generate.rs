@@ -8,6 +8,7 @@
 use serde_json::{Value, json};
 
 use super::Suite;
+use super::fixed::{self, Fixed};
 use super::rng::Rng;
 use super::room::Room;
 
@@ -57,7 +58,8 @@ fn recipe(suite: Suite) -> Recipe {
     let flat = Recipe { height: 8, arches: 0, free: 0.35, passage: 0.20, under: 6, distance: 2.0 };
     match suite {
         Suite::Table1 => Recipe { height: 20, arches: 6, free: 0.38, under: 8, ..flat },
-        Suite::Table2 => flat,
+        // Figures are fixed scenes and ask for no recipe.
+        Suite::Table2 | Suite::Fig5 | Suite::Fig6 => flat,
         Suite::Table3 => Recipe { distance: 5.0, ..flat },
     }
 }
@@ -83,37 +85,32 @@ pub fn default_boxes(suite: Suite) -> &'static [usize] {
         Suite::Table1 => &[15],
         Suite::Table2 => &[20],
         Suite::Table3 => &[10, 20, 35],
+        Suite::Fig5 | Suite::Fig6 => &[],
     }
 }
 
 /// Scenes a suite (and number of boxes) has in the paper.
 pub fn default_count(suite: Suite) -> usize {
-    if suite == Suite::Table1 { 500 } else { 200 }
+    match suite {
+        Suite::Table1 => 500,
+        Suite::Table2 | Suite::Table3 => 200,
+        Suite::Fig5 | Suite::Fig6 => 1,
+    }
 }
 
 /// A suite of `count` scenes for each number of boxes, as a `trajc.scenes/1` document. Scene k depends on the seed, the
-/// suite, the boxes and k alone.
+/// suite, the boxes and k alone. Figures are one fixed scene, whatever the other arguments.
 ///
 /// # Errors
 /// The number of boxes that left no room for a scene.
 pub fn document(suite: Suite, boxes: &[usize], count: usize, seed: u64) -> Result<String, usize> {
+    if let Some(fixed) = fixed::scene(suite) {
+        return Ok(written(&head(suite, suite.name(), 0, fixed.room), &[figure(suite, &fixed).to_string()]));
+    }
     let name = match boxes {
         [one] => format!("{}-{one}", suite.name()),
         _ => suite.name().to_owned(),
     };
-    let side = f64::from(SIDE) * CELL;
-    let mut limits = json!({
-        "wheel": {"speed_mps": 1.0, "acceleration_mps2": 1.0, "jerk_mps3": 4.0},
-        "base": {"speed_mps": 1.0, "acceleration_mps2": 1.0, "angular_acceleration_radps2": 2.5, "eta": 0.4},
-    });
-    if suite == Suite::Table1 {
-        limits["joints"] = json!({"blade": {"speed": 1.5, "acceleration": 3.0, "jerk": 15.0}});
-    }
-    let head = json!({
-        "schema": super::scenes::SCHEMA, "name": name, "seed": seed,
-        "bounds": [[0.0, 0.0, 0.0], [side, side, metres(recipe(suite).height)]],
-        "resolution": CELL, "clearance_m": 0.02, "limits": limits,
-    });
     let mut lines = Vec::new();
     for boxes in boxes {
         for k in 0..count {
@@ -121,9 +118,40 @@ pub fn document(suite: Suite, boxes: &[usize], count: usize, seed: u64) -> Resul
             lines.push(scene(suite, *boxes, seed, k, &id).ok_or(*boxes)?.to_string());
         }
     }
+    Ok(written(&head(suite, &name, seed, [SIDE, SIDE, recipe(suite).height]), &lines))
+}
+
+/// Everything but the scenes; `room` in cells.
+fn head(suite: Suite, name: &str, seed: u64, room: [i32; 3]) -> Value {
+    let mut limits = json!({
+        "wheel": {"speed_mps": 1.0, "acceleration_mps2": 1.0, "jerk_mps3": 4.0},
+        "base": {"speed_mps": 1.0, "acceleration_mps2": 1.0, "angular_acceleration_radps2": 2.5, "eta": 0.4},
+    });
+    if suite.has_blades() {
+        limits["joints"] = json!({"blade": {"speed": 1.5, "acceleration": 3.0, "jerk": 15.0}});
+    }
+    json!({
+        "schema": super::scenes::SCHEMA, "name": name, "seed": seed, "bounds": [[0.0, 0.0, 0.0], room.map(metres)],
+        "resolution": CELL, "clearance_m": 0.02, "limits": limits,
+    })
+}
+
+fn written(head: &Value, scenes: &[String]) -> String {
     let head = head.to_string();
     let head = head.strip_suffix('}').expect("a JSON object ends in its brace");
-    Ok(format!("{head},\"scenes\":[\n{}\n]}}\n", lines.join(",\n")))
+    format!("{head},\"scenes\":[\n{}\n]}}\n", scenes.join(",\n"))
+}
+
+/// The one scene of a figure.
+fn figure(suite: Suite, fixed: &Fixed) -> Value {
+    let boxes: Vec<Value> =
+        fixed.boxes.iter().map(|b| json!({"min": b.min.map(metres), "max": b.max.map(metres)})).collect();
+    let pose = |[x, y, degrees]: [f64; 3]| json!({"x": x / 20.0, "y": y / 20.0, "yaw": degrees.to_radians()});
+    let mut start = pose(fixed.start);
+    if let Some(blade) = fixed.blade {
+        start["joints"] = json!({"blade": blade});
+    }
+    json!({"id": suite.name(), "boxes": boxes, "start": start, "goal": pose(fixed.goal)})
 }
 
 /// Cells in metres, correctly rounded.

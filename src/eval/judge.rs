@@ -5,11 +5,13 @@ use std::time::Instant;
 use super::bound::travel_time;
 use super::excess::AlphaExcess;
 use super::scenes::{Scene, SceneSet};
+use super::turns::{Turns, least_radius};
+use crate::command::CommandTable;
 use crate::diag::Diagnostics;
 use crate::geom::Pose2;
 use crate::pipeline::{self, CompileOptions, Outcome, World};
 use crate::report::metrics;
-use crate::report::schema::Failure;
+use crate::report::schema::{Failure, LimitPart};
 use crate::report::{Metrics, Status};
 use crate::robot::RobotModel;
 use crate::trajectory::{Leg, Trajectory, steered_curve::SteeredCurve};
@@ -45,6 +47,14 @@ pub struct Judged {
     pub alpha_planned: Option<AlphaExcess>,
     /// Of the held commands.
     pub alpha_driven: Option<AlphaExcess>,
+    /// How tightly the held commands turn.
+    pub turns: Option<Turns>,
+    /// Least radius that the robot's limits allow a smooth curve, m.
+    pub least_radius: f64,
+    /// Moving joints, and their least and greatest position on the way.
+    pub joint_ranges: Vec<(String, [f64; 2])>,
+    /// Peaks of every actuator as commanded, against its limits; empty where nothing was judged.
+    pub limits: Vec<LimitPart>,
     /// Proven, m.
     pub clearance_proven: Option<f64>,
     /// From start to goal as the crow flies, m, and a time that no plan can beat on it, s.
@@ -113,11 +123,25 @@ pub fn judge(
         driven: compiled.map(|c| metrics::of_commands(&c.commands)),
         alpha_planned,
         alpha_driven: compiled.map(|c| AlphaExcess::of_commands(&c.commands, limit)),
+        turns: compiled.map(|c| Turns::of(&c.commands)),
+        least_radius: least_radius(&robot.base, robot.track_width),
+        joint_ranges: compiled.map(|c| joint_ranges(&c.commands)).unwrap_or_default(),
+        limits: report.limits.clone(),
         clearance_proven: report.certificate.as_ref().and_then(|c| c.clearance_proven_m),
         bound: bound(set, scene, robot),
         timings,
     };
     Ok((judged, outcome))
+}
+
+/// Least and greatest position of each joint.
+fn joint_ranges(table: &CommandTable) -> Vec<(String, [f64; 2])> {
+    let range = |(j, (name, _)): (usize, &(String, bool))| {
+        let positions = table.rows.iter().map(|row| row.joint_positions[j]);
+        let wider = |[low, high]: [f64; 2], q: f64| [low.min(q), high.max(q)];
+        (name.clone(), positions.fold([f64::INFINITY, f64::NEG_INFINITY], wider))
+    };
+    table.joints.iter().enumerate().map(range).collect()
 }
 
 /// Drives and turns on the spot. A leg of heading and arc length counts as one drive, whatever turns on the spot are in it.

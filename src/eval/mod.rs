@@ -6,11 +6,14 @@
 mod bound;
 mod excess;
 mod fault;
+mod figure_tables;
 pub mod figures;
+mod fixed;
 mod generate;
 mod json;
 mod judge;
 pub mod paper;
+mod picture;
 mod read;
 mod rng;
 mod room;
@@ -18,17 +21,22 @@ mod scenes;
 mod statistics;
 pub mod tables;
 mod text_table;
+mod turns;
 
 pub use bound::travel_time;
 pub use excess::AlphaExcess;
 pub use fault::ScenesError;
 pub use generate::{default_boxes, default_count, document};
 pub use judge::{Judged, judge};
+pub use picture::{picture, picture_name};
 pub use read::{LONGEST, read};
 pub use scenes::{SCHEMA, Scene, SceneSet};
 pub use statistics::Summary;
+pub use turns::{Turns, least_radius};
 
-/// The suites of \[SCR\] section VI.
+use crate::pipeline::CompileOptions;
+
+/// The suites of \[SCR\] section VI, and the scenes of two of its figures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Suite {
     /// Cubes and arch bridges, 10 x 10 x 1 m: before and after optimisation.
@@ -37,15 +45,45 @@ pub enum Suite {
     Table2,
     /// 10, 20 and 35 boxes, start and goal more than 5 m apart: against other planners.
     Table3,
+    /// One dense room with turns on the spot or nearly so: with and without dense sampling.
+    Fig5,
+    /// One way under two arch bridges, with the blades down and up.
+    Fig6,
 }
 
 impl Suite {
-    /// `table1`, `table2` or `table3`.
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Table1, Self::Table2, Self::Table3, Self::Fig5, Self::Fig6];
+
+    /// As on the command line: `table1`, `fig5`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Table1 => "table1",
             Self::Table2 => "table2",
             Self::Table3 => "table3",
+            Self::Fig5 => "fig5",
+            Self::Fig6 => "fig6",
+        }
+    }
+
+    /// Whether it is one fixed scene with a picture, not scenes drawn from a seed.
+    pub fn is_figure(self) -> bool {
+        matches!(self, Self::Fig5 | Self::Fig6)
+    }
+
+    /// Whether it runs with the robot whose blades move; else with the rigid box.
+    pub fn has_blades(self) -> bool {
+        matches!(self, Self::Table1 | Self::Fig6)
+    }
+
+    /// How each scene is compiled besides as usual. Table II: without dense sampling. Fig. 5: every turn part of one smooth curve,
+    /// as in the paper, without dense sampling and with it.
+    pub fn variants(self) -> Vec<CompileOptions> {
+        let usual = CompileOptions::default();
+        match self {
+            Self::Table2 => vec![CompileOptions { dense: false, ..usual }],
+            Self::Fig5 => [false, true].map(|dense| CompileOptions { dense, spins: false, ..usual }).to_vec(),
+            Self::Table1 | Self::Table3 | Self::Fig6 => Vec::new(),
         }
     }
 
@@ -55,6 +93,6 @@ impl Suite {
             let rest = set.name.strip_prefix(suite.name());
             rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
         };
-        [Self::Table1, Self::Table2, Self::Table3].into_iter().find(of)
+        Self::ALL.into_iter().find(of)
     }
 }

@@ -25,6 +25,9 @@ pub const TABLE2_WITH: DenseRow = DenseRow { counts: [152.0, 165.0, 35.0], time_
 /// Trajectories of Table II.
 pub const TABLE2_COUNT: f64 = 200.0;
 
+/// Fig. 5: the least turn radius of the trajectory in the picture, m.
+pub const FIG5_LEAST_RADIUS: f64 = 9.3e-3;
+
 /// A planner's row of Table III.
 pub struct PlannerRow {
     /// Boxes a scene.

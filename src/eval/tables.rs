@@ -2,21 +2,23 @@
 
 use std::collections::BTreeMap;
 
-use super::paper;
 use super::statistics::{Summary, mean, mean_metrics};
 use super::text_table::{TextTable, fixed};
 use super::{AlphaExcess, Judged, Suite};
+use super::{figure_tables, paper};
 use crate::report::Metrics;
 
 /// More different numbers of boxes than this are one row of Table III.
 const MOST_ROWS: usize = 6;
 
-/// The table of a suite; without one, Table III's figures for all scenes. `without_dense`: the same scenes without dense
-/// sampling (Table II).
-pub fn render(suite: Option<Suite>, judged: &[Judged], without_dense: &[Judged]) -> String {
+/// The table of a suite; without one, Table III's figures for all scenes. `variants`: the same scenes
+/// compiled as [`Suite::variants`] says.
+pub fn render(suite: Option<Suite>, judged: &[Judged], variants: &[Vec<Judged>]) -> String {
     match suite {
         Some(Suite::Table1) => table1(judged),
-        Some(Suite::Table2) => table2(judged, without_dense),
+        Some(Suite::Table2) => table2(judged, variants.first().map_or(&[], Vec::as_slice)),
+        Some(Suite::Fig5) => figure_tables::fig5(judged, variants),
+        Some(Suite::Fig6) => figure_tables::fig6(judged),
         Some(Suite::Table3) | None => table3(judged, suite.is_some()),
     }
 }

@@ -173,7 +173,7 @@ pub enum Parameterisation {
 
 impl Parameterisation {
     /// What a mission gets that names none.
-    pub const DEFAULT: Self = Self::Flat;
+    pub const DEFAULT: Self = Self::ArcLength;
 
     /// What a mission gets that names a law, but no parameterisation: laws of the distance driven have nothing to say where the base
     /// stands, as it may within the legs of [`Self::ArcLength`].

@@ -60,6 +60,15 @@ pub struct OptimizeOptions {
     pub lbfgs: LbfgsOptions,
 }
 
+impl OptimizeOptions {
+    /// The defaults, but every turn becomes part of a smooth curve, however tight: \[SCR\]'s way, which can all but stop and turn on
+    /// a radius of `v_min` by the turn rate allowed (section V-C). Slower to find than turns on the spot.
+    pub fn without_spins() -> Self {
+        let any = 2.0 * std::f64::consts::PI;
+        Self { spin_threshold: any, end_spin_threshold: any, slowest_corner: 0.0, ..Self::default() }
+    }
+}
+
 impl Default for OptimizeOptions {
     fn default() -> Self {
         Self {

@@ -4,6 +4,7 @@ mod build;
 pub mod metrics;
 pub mod names;
 pub mod path_error;
+pub mod plot;
 pub mod schema;
 pub mod summary;
 

@@ -32,6 +32,36 @@ fn every_kind_of_file_can_be_inspected() {
 }
 
 #[test]
+fn every_kind_of_file_can_be_drawn_and_the_same_file_draws_the_same() {
+    let sandbox = Sandbox::compiled();
+    for (file, expected) in [
+        ("robots/scr_db/robot.yaml", &["Robot scr_db", "joints at 50 % of their range", "moved by joints"][..]),
+        ("missions/a.yaml", &["Mission a", "obstacle", "start", "goal"]),
+        ("maps/first.csv", &["Map maps/first.csv", "obstacle", "x m"]),
+        ("out/a/commands.csv", &["Commands out/a/commands.csv", "obstacle", "path of the base", "rim speed m/s"]),
+        ("out/a/commands.mcap", &["Commands out/a/commands.mcap", "rim speed m/s"]),
+    ] {
+        let drawn = |name: &str| {
+            sandbox.run(&["inspect", file, "--plot", name]).expect(0);
+            sandbox.text(name)
+        };
+        let picture = drawn("a.svg");
+        let tree = roxmltree::Document::parse(&picture).expect("well-formed");
+        let texts: Vec<&str> = tree.descendants().filter(|n| n.has_tag_name("text")).filter_map(|n| n.text()).collect();
+        for text in expected {
+            assert!(texts.contains(text), "{file}: {text} in {texts:?}");
+        }
+        assert_eq!(picture, drawn("b.svg"), "{file}");
+    }
+    // A command file whose mission is gone is drawn without obstacles.
+    sandbox.remove("missions/a.yaml");
+    sandbox.run(&["inspect", "out/a/commands.csv", "--plot", "c.svg"]).expect(0);
+    assert!(!sandbox.text("c.svg").contains("obstacle") && sandbox.text("c.svg").contains("path of the base"));
+    let run = sandbox.run(&["inspect", "maps/first.csv", "--plot", "none/d.svg"]).expect(2);
+    assert!(run.stderr.contains("cannot write `none/d.svg`"), "{}", run.stderr);
+}
+
+#[test]
 fn the_slab_of_a_map_is_two_numbers() {
     let sandbox = Sandbox::new();
     let run = sandbox.run(&["inspect", "--height", "0.1,0.2", "maps/first.csv"]).expect(0);

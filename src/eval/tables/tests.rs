@@ -20,6 +20,10 @@ fn scene(id: &str, boxes: usize, time: f64, alpha: f64) -> Judged {
         driven: Some(metrics),
         alpha_planned: excess,
         alpha_driven: excess,
+        turns: None,
+        least_radius: 4e-3,
+        joint_ranges: vec![],
+        limits: vec![],
         clearance_proven: Some(0.03),
         bound: (4.0, 5.0),
         timings: vec![("search", 2.0), ("optimize", 3.0), ("certify", 1.0)],
@@ -41,7 +45,7 @@ fn table_two_counts_thresholds_cumulatively_as_the_paper_does() {
     let row = ExcessRow::of(&peaks);
     assert_eq!((row.above_1, row.below_10, row.below_25, row.above_25), (75.0, 50.0, 75.0, 25.0));
     assert!((row.time_above - 2.0).abs() < 1e-12);
-    let text = render(Some(Suite::Table2), &[scene("a", 20, 6.0, 1.0)], &[scene("a", 20, 6.0, 1.3)]);
+    let text = render(Some(Suite::Table2), &[scene("a", 20, 6.0, 1.0)], &[vec![scene("a", 20, 6.0, 1.3)]]);
     assert!(
         text.contains("76.0") && text.contains("64.0") && text.contains("ours, as commanded, without DS"),
         "{text}"
@@ -82,7 +86,37 @@ fn nothing_certified_is_a_table_of_dashes() {
     let mut failed = scene("bad", 10, 6.0, 1.0);
     failed.certified = false;
     for suite in [Some(Suite::Table1), Some(Suite::Table2), Some(Suite::Table3), None] {
-        assert!(!render(suite, &[failed.clone()], &[failed.clone()]).contains("NaN"));
+        assert!(!render(suite, &[failed.clone()], &[vec![failed.clone()]]).contains("NaN"));
     }
     assert!(render_profile(&[failed]).contains("optimize"));
+}
+
+#[test]
+fn fig_five_stands_beside_the_papers_radius_and_a_failure_has_no_figures() {
+    let turns = super::super::Turns { on_the_spot: 2, least_driven_m: Some(0.0123), tightest: None };
+    let usual = Judged { turns: Some(turns), ..scene("fig5", 30, 6.0, 1.1) };
+    let failed = Judged { certified: false, ..usual.clone() };
+    let text = render(Some(Suite::Fig5), std::slice::from_ref(&usual), &[vec![failed], vec![usual.clone()]]);
+    let row = |name: &str| text.lines().find(|l| l.trim().starts_with(name)).unwrap_or_default().to_owned();
+    assert!(row("paper").ends_with("9.3") && row("limits allow").ends_with("4.0"), "{text}");
+    assert!(row("ours, one curve, without DS").ends_with("failed"), "{text}");
+    for name in ["ours, one curve, with DS", "ours, as usual"] {
+        assert!(row(name).contains("12.3") && row(name).contains("110.0"), "{text}");
+    }
+}
+
+#[test]
+fn fig_six_has_each_actuator_against_its_limits() {
+    let limit = |actuator: &str, quantity: &str| crate::report::schema::LimitPart {
+        actuator: actuator.into(),
+        quantity: quantity.into(),
+        peak: Some(0.75),
+        limit: Some(1.5),
+    };
+    let limits = ["speed", "acceleration", "jerk"].map(|q| limit("blade", q)).to_vec();
+    let judged = Judged { limits, joint_ranges: vec![("blade".into(), [0.25, 2.125])], ..scene("fig6", 14, 6.0, 1.0) };
+    let text = render(Some(Suite::Fig6), &[judged], &[]);
+    let row = text.lines().find(|l| l.trim().starts_with("blade")).expect("a row");
+    let cells: Vec<&str> = row.split_whitespace().collect();
+    assert_eq!(cells, ["blade", "0.250", "2.125", "0.750", "1.500", "0.750", "1.500", "0.750", "1.500"]);
 }

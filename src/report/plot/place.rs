@@ -1,0 +1,36 @@
+//! The robot where a mission wants it, and in its postures.
+
+use super::{TopView, top};
+use crate::geom::Pose2;
+use crate::mission::PoseSpec;
+use crate::robot::RobotModel;
+
+/// Values tried of each joint for the robot's least height.
+const POSTURES: usize = 17;
+
+/// Draws start and goal where they are given: a heading left open as 0, joints left open in the middle of their range.
+pub fn ends(view: &mut TopView, robot: &RobotModel, [start, goal]: [Option<&PoseSpec>; 2]) {
+    for (pose, name) in [(start, "start"), (goal, "goal")] {
+        if let Some((x, y, pose)) = pose.and_then(|p| Some((p.x?, p.y?, p))) {
+            let q: Vec<f64> = robot
+                .joints
+                .iter()
+                .zip(posture(robot, 0.5))
+                .map(|(joint, middle)| pose.joints.get(&joint.name).copied().unwrap_or(middle))
+                .collect();
+            view.end(robot, Pose2::new(x, y, pose.yaw.unwrap_or(0.0)), &q, name);
+        }
+    }
+}
+
+/// Every joint at the same share (0 to 1) of its range; joints without ends at 0.
+pub fn posture(robot: &RobotModel, share: f64) -> Vec<f64> {
+    let value = |low: f64, high: f64| if (high - low).is_finite() { low + share * (high - low) } else { 0.0 };
+    robot.joints.iter().map(|j| value(j.lower, j.upper)).collect()
+}
+
+/// Height of the robot at its lowest, m, all joints moved alike through their ranges: what hangs higher can be passed under.
+pub fn least_top(robot: &RobotModel) -> f64 {
+    let share = |k: usize| k as f64 / (POSTURES - 1) as f64;
+    (0..POSTURES).map(|k| top(robot, &posture(robot, share(k)))).fold(f64::INFINITY, f64::min)
+}
