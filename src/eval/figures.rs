@@ -83,7 +83,7 @@ fn totals(set: &SceneSet, suite: Option<Suite>, judged: &[Judged], variants: &[V
         "by_boxes": rows.collect::<Vec<_>>(),
         "profile_ms": profile,
     });
-    if let (Some(Suite::Table2), [without_dense]) = (suite, variants) {
+    if let (Some(Suite::Table2), [sparse, dense]) = (suite, variants) {
         let excess = |judged: &[Judged], of: fn(&Judged) -> Option<AlphaExcess>| {
             let all: Vec<AlphaExcess> = judged.iter().filter(|j| j.certified).filter_map(of).collect();
             value(&ExcessRow::of(&all))
@@ -95,7 +95,8 @@ fn totals(set: &SceneSet, suite: Option<Suite>, judged: &[Judged], variants: &[V
                 "computation_ms": Summary::of(judged.iter().filter_map(Judged::computation_ms)).mean,
             })
         };
-        totals["alpha_excess_percent"] = json!({"dense": rows(judged), "sparse": rows(without_dense)});
+        totals["alpha_excess_percent"] =
+            json!({"arc_length": rows(judged), "flat_dense": rows(dense), "flat_sparse": rows(sparse)});
     }
     if let (Some(Suite::Fig5), [sparse, dense]) = (suite, variants) {
         let scenes = |judged: &[Judged]| judged.iter().map(|j| scene(suite, j)).collect::<Vec<_>>();

@@ -34,6 +34,7 @@ pub use scenes::{SCHEMA, Scene, SceneSet};
 pub use statistics::Summary;
 pub use turns::{Turns, least_radius};
 
+use crate::mission::Parameterisation;
 use crate::pipeline::CompileOptions;
 
 /// The suites of \[SCR\] section VI, and the scenes of two of its figures.
@@ -76,13 +77,13 @@ impl Suite {
         matches!(self, Self::Table1 | Self::Fig6)
     }
 
-    /// How each scene is compiled besides as usual. Table II: without dense sampling. Fig. 5: every turn part of one smooth curve,
-    /// as in the paper, without dense sampling and with it.
+    /// How each scene is compiled besides as usual: in the paper's own parameterisation without dense sampling and with it; for
+    /// Fig. 5 with every turn part of one smooth curve, as in the paper.
     pub fn variants(self) -> Vec<CompileOptions> {
-        let usual = CompileOptions::default();
+        let flat = CompileOptions { parameterisation: Some(Parameterisation::Flat), ..Default::default() };
         match self {
-            Self::Table2 => vec![CompileOptions { dense: false, ..usual }],
-            Self::Fig5 => [false, true].map(|dense| CompileOptions { dense, spins: false, ..usual }).to_vec(),
+            Self::Table2 => [false, true].map(|dense| CompileOptions { dense, ..flat }).to_vec(),
+            Self::Fig5 => [false, true].map(|dense| CompileOptions { dense, spins: false, ..flat }).to_vec(),
             Self::Table1 | Self::Table3 | Self::Fig6 => Vec::new(),
         }
     }

@@ -16,7 +16,7 @@ const MOST_ROWS: usize = 6;
 pub fn render(suite: Option<Suite>, judged: &[Judged], variants: &[Vec<Judged>]) -> String {
     match suite {
         Some(Suite::Table1) => table1(judged),
-        Some(Suite::Table2) => table2(judged, variants.first().map_or(&[], Vec::as_slice)),
+        Some(Suite::Table2) => table2(judged, variants),
         Some(Suite::Fig5) => figure_tables::fig5(judged, variants),
         Some(Suite::Fig6) => figure_tables::fig6(judged),
         Some(Suite::Table3) | None => table3(judged, suite.is_some()),
@@ -78,7 +78,7 @@ fn percent(change: f64) -> String {
     if change.is_finite() { format!("{change:+.0} %") } else { "-".into() }
 }
 
-fn table2(judged: &[Judged], without_dense: &[Judged]) -> String {
+fn table2(judged: &[Judged], variants: &[Vec<Judged>]) -> String {
     let head = ["α over its limit, % of trajectories", "n", "> 1 %", "< 10 %", "< 25 %", "> 25 %", "PT %", "CT ms"];
     let title = format!("Table II, {} scenes (DS: dense sampling; CT: mean of search + optimise)", judged.len());
     let mut table = TextTable::new(title, &head);
@@ -91,13 +91,14 @@ fn table2(judged: &[Judged], without_dense: &[Judged]) -> String {
     type Excess = fn(&Judged) -> Option<AlphaExcess>;
     let kinds: [(&str, Excess); 2] = [("optimised", |j| j.alpha_planned), ("as commanded", |j| j.alpha_driven)];
     for (name, of) in kinds {
-        for (dense, judged) in [("without DS", without_dense), ("with DS", judged)] {
+        let rows = ["flat, without DS", "flat, with DS"].into_iter().zip(variants.iter().map(Vec::as_slice));
+        for (how, judged) in rows.chain([("arc length", judged)]) {
             let all: Vec<AlphaExcess> = certified(judged).filter_map(of).collect();
             let row = ExcessRow::of(&all);
             let mut cells = vec![all.len().to_string()];
             cells.extend([row.above_1, row.below_10, row.below_25, row.above_25].map(|v| fixed(v, 1)));
             cells.extend([fixed(row.time_above, 2), fixed(computation(judged).mean, 1)]);
-            table.row(format!("ours, {name}, {dense}"), cells);
+            table.row(format!("ours, {name}, {how}"), cells);
         }
     }
     table.render()
