@@ -5,7 +5,7 @@ use crate::geom::Pose2;
 use crate::search::{SearchMove, SearchState};
 
 /// A path from (turn, distance, joint) steps from the origin; negative distance: reverse.
-fn path(joints: usize, steps: &[(f64, f64, f64)]) -> SearchPath {
+pub(super) fn path(joints: usize, steps: &[(f64, f64, f64)]) -> SearchPath {
     let posture = |q: f64| if joints > 0 { vec![q] } else { vec![] };
     let mut states = vec![SearchState { pose: Pose2::default(), joints: posture(steps[0].2) }];
     let mut moves = Vec::new();
@@ -23,8 +23,12 @@ fn path(joints: usize, steps: &[(f64, f64, f64)]) -> SearchPath {
     SearchPath { states, moves, expanded: 0 }
 }
 
+fn flat() -> OptimizeOptions {
+    OptimizeOptions { parameterisation: Parameterisation::Flat, ..Default::default() }
+}
+
 fn run(path: &SearchPath, field: &Boxes, robot: &RobotModel) -> Trajectory {
-    let trajectory = optimize_in(path, field, robot, &OptimizeOptions::default());
+    let trajectory = optimize_in(path, field, robot, &flat());
     assert_joined(path, &trajectory);
     trajectory
 }
@@ -65,7 +69,7 @@ fn assert_joined(path: &SearchPath, trajectory: &Trajectory) {
 
 /// Every driven leg, solved once more, with its figures.
 fn solved(path: &SearchPath, field: &Boxes, robot: &RobotModel) -> Vec<SolvedLeg> {
-    let options = OptimizeOptions::default();
+    let options = flat();
     let context = Context::new(robot, field, &options);
     sections(path, 0, path.moves.len(), &context.limits, Thresholds::of(&options))
         .into_iter()
@@ -77,7 +81,7 @@ fn solved(path: &SearchPath, field: &Boxes, robot: &RobotModel) -> Vec<SolvedLeg
 }
 
 /// A wall with a gap that only the raised blades fit, and posts before and after.
-fn gap() -> (SearchPath, Boxes) {
+pub(super) fn gap() -> (SearchPath, Boxes) {
     let steps = [(0.0, 1.0, 2.0), (0.0, 0.7, 0.2), (0.0, 0.6, 0.2), (0.0, 1.0, 2.5), (0.3, 0.0, 2.5), (0.0, 1.0, 2.5)];
     let field = Boxes(vec![
         ([1.9, 0.32, 0.0], [2.1, 3.0, 1.0]),
@@ -163,22 +167,25 @@ fn a_path_that_goes_nowhere_stands_still() {
     assert!(matches!(&trajectory.legs[..], [Leg::Still(_)]));
 }
 
+/// A field that knows nothing.
+pub(super) struct Broken;
+
+impl DistanceField for Broken {
+    fn distance(&self, _: [f64; 3]) -> f64 {
+        f64::NAN
+    }
+    fn distance_gradient(&self, _: [f64; 3]) -> (f64, [f64; 3]) {
+        (f64::NAN, [f64::NAN; 3])
+    }
+    fn cell(&self) -> f64 {
+        0.05
+    }
+}
+
 #[test]
 fn a_field_of_nans_gives_the_first_guess_back() {
-    struct Broken;
-    impl DistanceField for Broken {
-        fn distance(&self, _: [f64; 3]) -> f64 {
-            f64::NAN
-        }
-        fn distance_gradient(&self, _: [f64; 3]) -> (f64, [f64; 3]) {
-            (f64::NAN, [f64::NAN; 3])
-        }
-        fn cell(&self) -> f64 {
-            0.05
-        }
-    }
     let path = path(0, &[(0.0, 2.0, 0.0), (0.5, 0.0, 0.0), (0.0, 2.0, 0.0)]);
-    let trajectory = optimize_in(&path, &Broken, &robot(0), &OptimizeOptions::default());
+    let trajectory = optimize_in(&path, &Broken, &robot(0), &flat());
     assert_eq!(trajectory.optimiser.unwrap().ending, Ending::LineSearchStalled);
     assert_joined(&path, &trajectory);
     for leg in &trajectory.legs {

@@ -45,11 +45,16 @@ fn table_two_counts_thresholds_cumulatively_as_the_paper_does() {
     let row = ExcessRow::of(&peaks);
     assert_eq!((row.above_1, row.below_10, row.below_25, row.above_25), (75.0, 50.0, 75.0, 25.0));
     assert!((row.time_above - 2.0).abs() < 1e-12);
-    let text = render(Some(Suite::Table2), &[scene("a", 20, 6.0, 1.0)], &[vec![scene("a", 20, 6.0, 1.3)]]);
-    assert!(
-        text.contains("76.0") && text.contains("64.0") && text.contains("ours, as commanded, without DS"),
-        "{text}"
-    );
+    let of = |peak: f64| vec![scene("a", 20, 6.0, peak)];
+    let text = render(Some(Suite::Table2), &of(1.0), &[of(1.3), of(1.05)]);
+    let above_25 = |name: &str| {
+        let row = text.lines().find(|line| line.contains(name)).unwrap_or_else(|| panic!("{name} in {text}"));
+        row.split_whitespace().rev().nth(2).map(str::to_owned)
+    };
+    assert!(text.contains("76.0") && text.contains("64.0"), "{text}");
+    assert_eq!(above_25("ours, as commanded, flat, without DS").as_deref(), Some("100.0"));
+    assert_eq!(above_25("ours, as commanded, flat, with DS").as_deref(), Some("0.0"));
+    assert_eq!(above_25("ours, as commanded, arc length").as_deref(), Some("0.0"));
 }
 
 #[test]

@@ -81,8 +81,8 @@ impl Integral {
             return;
         };
         let (along, share) = (last.along(), self.share);
-        for axis in 0..2 {
-            self.sum[axis] += share * last.speed * along[axis];
+        for (axis, along) in along.into_iter().enumerate() {
+            self.sum[axis] += share * last.speed * along;
             for (sum, by) in self.sum_by[axis].iter_mut().zip(&last.by(axis)) {
                 *sum += share * by;
             }

@@ -110,7 +110,7 @@ fn samples(layout: Layout, piece: usize, x: &[f64], options: &SteerOptions) -> u
     let length = (arc(piece + 1) - arc(piece)).abs();
     let time = x[layout.duration(piece)].exp();
     let count = (length / options.sample_distance).max(time / options.sample_time);
-    2 * (0.5 * count.clamp(4.0, 20.0)).ceil() as usize
+    2 * (0.5 * count.clamp(6.0, 20.0)).ceil() as usize
 }
 
 fn trajectory(leg: Leg, outcome: OptimiserOutcome) -> Trajectory {
@@ -129,3 +129,6 @@ fn curve(layout: Layout, x: &[f64]) -> PiecewisePoly {
     };
     PiecewisePoly { pieces: (0..layout.pieces).map(piece).collect() }
 }
+
+#[cfg(test)]
+mod tests;

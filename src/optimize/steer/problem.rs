@@ -209,9 +209,9 @@ impl<'a, F: DistanceField> Problem<'a, F> {
         out.hessian.clear();
         self.contacts.clear();
         let mut cost = 0.0;
-        for piece in 0..self.layout.pieces {
+        for (piece, multiplier) in multipliers.iter().enumerate() {
             let time = self.load(piece, x);
-            let (own, gap) = self.piece(piece, x, time, multipliers[piece]);
+            let (own, gap) = self.piece(piece, x, time, *multiplier);
             cost += own;
             out.gaps[piece] = gap;
             self.scatter(piece, time, out);

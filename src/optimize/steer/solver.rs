@@ -191,9 +191,9 @@ impl Workspace {
         }
         let jacobians = problem.gap_jacobians(x);
         for (piece, by) in jacobians.iter().enumerate() {
-            for axis in 0..2 {
+            for (axis, by) in by.iter().enumerate() {
                 let gap = self.here.gaps[piece][axis];
-                let change = problem.along(piece, &by[axis], &self.step);
+                let change = problem.along(piece, by, &self.step);
                 let old = self.multipliers[piece][axis];
                 merit.predicted -= change * (old + STIFFNESS * gap) + 0.5 * STIFFNESS * change * change;
                 let new = old + STIFFNESS * (gap + change);
@@ -232,9 +232,9 @@ impl Workspace {
             }
             self.step.fill(0.0);
             for (piece, by) in problem.gap_jacobians(x).iter().enumerate() {
-                for axis in 0..2 {
+                for (axis, by) in by.iter().enumerate() {
                     let row =
-                        Row { piece, weight: STIFFNESS, value: self.here.gaps[piece][axis], by: by[axis].clone() };
+                        Row { piece, weight: STIFFNESS, value: self.here.gaps[piece][axis], by: by.clone() };
                     problem.pull(&row, &mut self.step);
                 }
             }

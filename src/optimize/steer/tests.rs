@@ -1,0 +1,259 @@
+use super::guess::{Guess, guess};
+use super::problem::{Derivatives, Problem, STIFFNESS, Weights};
+use super::*;
+use crate::geom::Pose2;
+use crate::math::fd::{numeric_gradient, relative_error};
+use crate::optimize::test_robot::{Boxes, robot};
+use crate::optimize::tests::{Broken, gap, path};
+use crate::trajectory::steered_curve::SteeredCurve;
+
+const WEIGHTS: Weights = Weights { smoothness: 20.0, motion: 30.0, clearance: 200.0, clearance_unit: 0.05 };
+
+fn problem<'a>(robot: &'a RobotModel, field: &'a Boxes, first: &Guess) -> Problem<'a, Boxes> {
+    let clearance = ClearancePenalty::new(Contour::new(robot, 0.08), robot, 0.3, 0.05, 0.0);
+    let counts: Vec<usize> = (0..first.layout.pieces).map(|k| 6 + 2 * (k % 2)).collect();
+    Problem::new(robot, field, clearance, first.directions.clone(), first.fixed.clone(), &counts, WEIGHTS)
+}
+
+/// The guess for a path, disturbed so that no term is at rest and many limits are overstepped.
+fn disturbed(first: &Guess) -> Vec<f64> {
+    let mut x = first.x.clone();
+    for (i, (value, fixed)) in x.iter_mut().zip(&first.fixed).enumerate() {
+        if !fixed {
+            *value += 0.15 * ((i * 37 % 19) as f64 / 9.0 - 1.0);
+        }
+    }
+    x
+}
+
+/// Joints, distances and turns of all kinds, past boxes.
+fn mixed(joints: usize) -> (SearchPath, Boxes) {
+    let steps = [
+        (0.7, 0.0, 0.2),
+        (0.0, 1.4, 0.9),
+        (0.8, 0.0, 0.9),
+        (0.0, 1.2, 0.4),
+        (2.4, 0.0, 0.4),
+        (0.0, -0.9, 1.0),
+        (0.4, 0.0, 0.6),
+    ];
+    let field = Boxes(vec![([0.9, -0.4, 0.0], [1.4, 0.5, 0.6]), ([-0.3, 1.6, 0.0], [0.3, 2.2, 0.4])]);
+    let mut path = path(joints.min(1), &steps);
+    if joints > 1 {
+        path.states.iter_mut().enumerate().for_each(|(i, state)| state.joints.push(0.05 * i as f64));
+    }
+    (path, field)
+}
+
+#[test]
+fn the_gradient_matches_finite_differences() {
+    for joints in [0, 1, 2] {
+        let (path, field) = mixed(joints);
+        let robot = robot(joints);
+        let first = guess(&path, &Limits::new(&robot, 1.0)).expect("it moves");
+        let mut problem = problem(&robot, &field, &first);
+        let x = disturbed(&first);
+        let multipliers: Vec<[f64; 2]> = (0..first.layout.pieces).map(|k| [0.3 * k as f64, -0.2]).collect();
+        let mut at = Derivatives::new(first.layout);
+        assert!(problem.evaluate(&x, &multipliers, &mut at) > 20.0);
+        assert!(problem.contacts.len() > 5, "{} contour points are near", problem.contacts.len());
+        let gradient = at.gradient.clone();
+        // The gaps' share is that of the multipliers and of their stiff square.
+        let mut whole = |x: &[f64]| {
+            let cost = problem.evaluate(x, &multipliers, &mut at);
+            let gaps = at.gaps.iter().zip(&multipliers).flat_map(|(gap, multiplier)| gap.iter().zip(multiplier));
+            cost + gaps.map(|(gap, multiplier)| gap * (multiplier + 0.5 * STIFFNESS * gap)).sum::<f64>()
+        };
+        let numeric = numeric_gradient(|x| whole(x), &x, 2e-6);
+        for (i, fixed) in first.fixed.iter().enumerate() {
+            let size = numeric.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+            let numeric = if *fixed { 0.0 } else { numeric[i] };
+            let off = (gradient[i] - numeric).abs();
+            assert!(off < 1e-6 * size + 1e-5 * numeric.abs(), "{joints} joints, {i}: {} {numeric}", gradient[i]);
+        }
+    }
+}
+
+#[test]
+fn the_hessian_is_that_of_the_squares_where_all_limits_are_kept() {
+    // No limit is active: time, jerk and gaps. For waypoints at fixed durations the jerk's square is quadratic, so Gauss-Newton
+    // is exact in every unknown but the durations (and the headings, by which the gaps are curved: left out by no gap).
+    let robot = robot(0);
+    let path = path(0, &[(0.0, 4.0, 0.0)]);
+    let field = Boxes(vec![]);
+    let first = guess(&path, &Limits::new(&robot, 1.0)).expect("it moves");
+    let mut problem = problem(&robot, &field, &first);
+    let mut x = first.x.clone();
+    // Long pieces: nothing is fast.
+    (0..first.layout.pieces).for_each(|k| x[first.layout.duration(k)] = 20f64.ln());
+    for node in 1..first.layout.pieces {
+        x[first.layout.state(node, 1, 1)] = 0.07 - 0.01 * node as f64;
+        x[first.layout.state(node, 0, 2)] = 1e-4;
+    }
+    let zero = vec![[0.0; 2]; first.layout.pieces];
+    let mut at = Derivatives::new(first.layout);
+    problem.evaluate(&x, &zero, &mut at);
+    let hessian = at.hessian.clone();
+    for node in 1..first.layout.pieces {
+        for order in 0..3 {
+            let index = first.layout.state(node, 1, order);
+            let mut column = vec![0.0; x.len()];
+            let mut unit = vec![0.0; x.len()];
+            unit[index] = 1.0;
+            hessian.multiply(&unit, &mut column);
+            let step = 1e-4;
+            let mut gradient = |offset: f64| {
+                let mut moved = x.clone();
+                moved[index] += offset;
+                problem.evaluate(&moved, &zero, &mut at);
+                at.gradient.clone()
+            };
+            let (up, down) = (gradient(step), gradient(-step));
+            let numeric: Vec<f64> = up.iter().zip(&down).map(|(u, d)| (u - d) / (2.0 * step)).collect();
+            for other in 1..first.layout.pieces {
+                let rows: Vec<usize> = (0..3).map(|o| first.layout.state(other, 1, o)).collect();
+                let own: Vec<f64> = rows.iter().map(|r| column[*r]).collect();
+                let theirs: Vec<f64> = rows.iter().map(|r| numeric[*r]).collect();
+                assert!(relative_error(&own, &theirs, 1.0) < 1e-5, "{own:?} {theirs:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn points_linearised_at_a_place_move_as_they_say() {
+    let (path, field) = mixed(1);
+    let robot = robot(1);
+    let first = guess(&path, &Limits::new(&robot, 1.0)).expect("it moves");
+    let mut problem = problem(&robot, &field, &first);
+    let x = disturbed(&first);
+    let mut at = Derivatives::new(first.layout);
+    let zero = vec![[0.0; 2]; first.layout.pieces];
+    problem.evaluate(&x, &zero, &mut at);
+    let contacts = problem.contacts.clone();
+    let rows = problem.rows(&x, &contacts);
+    assert_eq!(rows.len(), contacts.len());
+    for (row, contact) in rows.iter().zip(&contacts) {
+        assert!((row.value - contact.short / WEIGHTS.clearance_unit).abs() < 1e-9);
+    }
+    // A small step changes each value as its row says; durations too, by what they do to the data.
+    let step: Vec<f64> =
+        (0..x.len()).map(|i| if first.fixed[i] { 0.0 } else { ((i * 29) % 13) as f64 / 13.0 - 0.5 }).collect();
+    let moved = |share: f64| -> Vec<f64> { x.iter().zip(&step).map(|(x, s)| x + share * s).collect() };
+    let (up, down) = (problem.rows(&moved(1e-6), &contacts), problem.rows(&moved(-1e-6), &contacts));
+    let by_time = first.layout.local_time();
+    for ((row, up), down) in rows.iter().zip(&up).zip(&down) {
+        // The row is of the weighted square's root: its derivative by the duration holds half the value besides.
+        let of_weight = 0.5 * row.value * step[row.piece * first.layout.block() + first.layout.offsets()[by_time]];
+        let slope = problem.along(row.piece, &row.by, &step) - of_weight;
+        let numeric = (up.value - down.value) / 2e-6;
+        assert!((slope - numeric).abs() < 1e-4 * (1.0 + numeric.abs()), "{slope} {numeric}");
+    }
+}
+
+fn steer(path: &SearchPath, field: &Boxes, robot: &RobotModel) -> (SteerLeg, OptimiserOutcome) {
+    let options = OptimizeOptions { clearance: 0.03, ..Default::default() };
+    let trajectory = optimize_steered(path, field, robot, &options);
+    let [Leg::Steer(leg)] = &trajectory.legs[..] else { panic!("one leg") };
+    (leg.clone(), trajectory.optimiser.expect("optimised"))
+}
+
+/// From the path's first state to its last, at rest at both, near every limit where it is fast.
+fn assert_motion(path: &SearchPath, leg: &SteerLeg, robot: &RobotModel) {
+    let (from, to) = (&path.states[0], &path.states[path.states.len() - 1]);
+    let curve = SteeredCurve::new(leg).expect("sound");
+    let (start, end) = (curve.pose(curve.start()), curve.end_pose());
+    for (pose, wanted) in [(start, from.pose), (end, to.pose)] {
+        assert!(pose.distance(wanted) < 1e-5, "{pose:?} {wanted:?}");
+        assert!((pose.yaw - wanted.yaw).abs() < 1e-9);
+    }
+    let (poly, duration) = (&leg.curve, leg.curve.duration());
+    for dimension in 0..2 + robot.joints.len() {
+        for order in 1..3 {
+            for t in [0.0, duration] {
+                assert!(poly.derivative(dimension, order, t).abs() < 1e-9);
+            }
+        }
+    }
+    for j in 0..robot.joints.len() {
+        assert!((poly.derivative(2 + j, 0, 0.0) - from.joints[j]).abs() < 1e-9);
+        assert!((poly.derivative(2 + j, 0, duration) - to.joints[j]).abs() < 1e-9);
+    }
+    // The penalties are soft: a few per cent. The time law keeps the limits.
+    let within = |value: f64, limit: f64| assert!(value.abs() < 1.1 * limit, "{value} of {limit}");
+    for k in 0..=2000 {
+        let t = duration * k as f64 / 2000.0;
+        let at = |dimension: usize, order: usize| poly.derivative(dimension, order, t);
+        within(at(1, 1), robot.base.speed);
+        within(at(1, 2), robot.base.acceleration);
+        within(at(0, 2), robot.base.angular_acceleration);
+        within(at(0, 1).abs() * 0.16 / robot.base.eta + at(1, 1).abs(), robot.base.speed); // Eq. 14
+        for (j, joint) in robot.joints.iter().enumerate() {
+            within(at(2 + j, 1), joint.limits.planning()[0]);
+        }
+    }
+}
+
+#[test]
+fn a_robot_that_changes_shape_passes_a_gap() {
+    let (path, field) = gap();
+    let robot = robot(1);
+    let (leg, outcome) = steer(&path, &field, &robot);
+    assert_eq!(outcome.ending, Ending::Converged);
+    assert_motion(&path, &leg, &robot);
+    // Every contour point keeps nearly all of the wanted clearance at every instant looked at.
+    let contour = Contour::new(&robot, 0.03);
+    let curve = SteeredCurve::new(&leg).expect("sound");
+    let mut poses = Vec::new();
+    for k in 0..=400 {
+        let place = curve.place(curve.duration() * k as f64 / 400.0);
+        robot.body_poses(&[curve.jet(2, place)[0]], &mut poses);
+        let base = curve.pose(place).isometry();
+        for shape in &contour.shapes {
+            for point in &contour.points[shape.patches[0].first..shape.patches[0].last] {
+                let distance = field.distance((base * poses[shape.body] * point.at).coords.into()) - point.radius;
+                assert!(distance > 0.02, "{distance} at {k}");
+            }
+        }
+    }
+}
+
+#[test]
+fn spins_cusps_and_joints_alone_are_part_of_one_motion() {
+    let (path, _) = mixed(1);
+    let robot = robot(1);
+    let (leg, _) = steer(&path, &Boxes(vec![]), &robot);
+    assert_motion(&path, &leg, &robot);
+    let curve = SteeredCurve::new(&leg).expect("sound");
+    let last = curve.jet(1, curve.end())[0];
+    assert!(last < curve.length() - 0.5, "it drives backwards for a while");
+    // On the spot: a quintic from rest to rest would take longer.
+    let spin = super::super::tests::path(1, &[(2.0, 0.0, 1.0)]);
+    let (leg, _) = steer(&spin, &Boxes(vec![]), &robot);
+    assert_motion(&spin, &leg, &robot);
+}
+
+#[test]
+fn a_straight_line_in_the_open_takes_little_more_than_the_trapezoid() {
+    let path = path(0, &[(0.0, 6.0, 0.0)]);
+    let robot = robot(0);
+    let mut options = OptimizeOptions::default();
+    options.steer.smoothness = 0.05;
+    let trajectory = optimize_steered(&path, &Boxes(vec![]), &robot, &options);
+    let [Leg::Steer(leg)] = &trajectory.legs[..] else { panic!("one leg") };
+    // 6 m at 0.5 m/s with ramps of 1 s, and 0.05 s for the jerk of 10 m/s^3.
+    let time = leg.curve.duration();
+    assert!(time > 12.9 && time < 13.5, "{time}");
+}
+
+#[test]
+fn a_path_that_goes_nowhere_and_a_field_of_nans_are_survived() {
+    let state = crate::search::SearchState { pose: Pose2::new(1.0, 2.0, 3.0), joints: vec![0.5] };
+    let nowhere = SearchPath { states: vec![state], moves: Vec::new(), expanded: 0 };
+    let trajectory = optimize_steered(&nowhere, &Boxes(vec![]), &robot(1), &OptimizeOptions::default());
+    assert!(matches!(&trajectory.legs[..], [Leg::Still(_)]));
+    let path = path(0, &[(0.0, 2.0, 0.0), (0.5, 0.0, 0.0), (0.0, 2.0, 0.0)]);
+    let trajectory = optimize_steered(&path, &Broken, &robot(0), &OptimizeOptions::default());
+    let [Leg::Steer(leg)] = &trajectory.legs[..] else { panic!("one leg") };
+    assert!(leg.curve.pieces.iter().flat_map(|p| p.coefficients.iter().flatten()).all(|c| c.is_finite()));
+}
