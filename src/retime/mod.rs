@@ -1,8 +1,8 @@
 //! Stage 8: when to be where on the path: time laws under wheel and joint limits.
 //!
 //! Every leg is a curve q = (left wheel, right wheel, joints) of one parameter ([`course`]). A law makes that parameter a function
-//! of time ([`convolution`], [`warp`]); joints are carried along, so no law changes the set of poses and postures. Then each leg is
-//! slowed down uniformly until every limit holds ([`peaks`]).
+//! of time ([`convolution`], [`warp`], [`optimal`]); joints are carried along, so no law changes the set of poses and postures. Then each
+//! leg is slowed down uniformly until every limit holds ([`limits`], [`peaks`]).
 
 pub mod convolution;
 pub mod course;
@@ -38,12 +38,6 @@ pub struct RetimeOptions {
 /// Why a trajectory has no profile under a law.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RetimeError {
-    /// A law of a later version.
-    #[error("time law `{law}` is not there yet")]
-    NotYet {
-        /// Its key in the mission.
-        law: &'static str,
-    },
     /// Eq. 2 as printed is no arc-length inverse, and on several segments not even a parameter.
     #[error(
         "time law `printed` needs a given path of one cubic Bezier segment: u = s/B_d has no meaning on anything else"
@@ -106,9 +100,6 @@ pub enum RetimeError {
 impl Describe for RetimeError {
     fn diagnostic(&self) -> Diagnostic {
         match self {
-            Self::NotYet { .. } => {
-                Diagnostic::error("retime/not-yet", self).hint("use auto, fixed_point, eq5, printed or minco")
-            }
             Self::PrintedNeedsOneSegment => Diagnostic::error("retime/printed-needs-one-segment", self)
                 .hint("use eq5: the same law with the true inverse of the arc length"),
             Self::NoOwnTiming => Diagnostic::error("retime/no-own-timing", self).hint("use auto, fixed_point or eq5"),
@@ -157,9 +148,6 @@ pub fn retime(
     let hold = options.sampling_time;
     if !(hold.is_finite() && hold > 0.0) {
         return Err(RetimeError::SamplingTime { sampling_time: hold });
-    }
-    if matches!(options.law, TimeLaw::Wheel) {
-        return Err(RetimeError::NotYet { law: law_key(options.law) });
     }
     let given = trajectory.source == TrajectorySource::Given;
     if options.law == TimeLaw::Minco && given {

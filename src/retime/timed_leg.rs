@@ -213,7 +213,8 @@ impl TimedLeg {
     }
 
     /// Speed, acceleration and jerk of (left, right, joints…, centre) before the slow-down, appended to `out`.
-    pub fn clock_rates(&self, t: f64, out: &mut Vec<[f64; 3]>) {        match self.locate(t) {
+    pub fn clock_rates(&self, t: f64, out: &mut Vec<[f64; 3]>) {
+        match self.locate(t) {
             At::Share(p, [_, d1, d2, d3]) => {
                 let changes = p.wheel_changes().into_iter().chain(p.joint_changes.iter().copied()).chain([p.drive]);
                 out.extend(changes.map(|q| compose([q, 0.0, 0.0], [d1, d2, d3])));
