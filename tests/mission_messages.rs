@@ -114,7 +114,6 @@ fn wrong_values() {
     mission("height_count", &with("map: {file: a.pcd, height_m: [1.0]}"));
     mission("unknown_word", &with("map: {file: a.pcd, unknown: ocupied}"));
     mission("sampling_tracked", &with("sampling: tracked"));
-    mission("time_law_optimal", &with("time_law: optimal"));
     mission("time_law_word", &with("time_law: fastest"));
     mission("flag", &with("reverse: yes"));
     mission("list_for_table", &with("start: [0.5, 0.5, 0]"));

@@ -157,8 +157,8 @@ static SAMPLING: [Choice; 3] = [
 
 static TIME_LAW: [Choice; 7] = [
     Choice::now("auto"),
-    Choice::later("optimal", "a later version will have it; use `auto`, the fastest law there is now"),
-    Choice::later("wheel", "a later version will have it; use `auto`, the fastest law there is now"),
+    Choice::now("optimal"),
+    Choice::now("wheel"),
     Choice::now("fixed_point"),
     Choice::now("eq5"),
     Choice::now("printed"),

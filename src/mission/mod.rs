@@ -179,8 +179,8 @@ impl Parameterisation {
     /// stands, as it may within the legs of [`Self::ArcLength`].
     pub fn suiting(law: TimeLaw) -> Self {
         match law {
-            TimeLaw::Eq5 | TimeLaw::FixedPoint | TimeLaw::Printed => Self::Flat,
-            TimeLaw::Auto | TimeLaw::Optimal | TimeLaw::Wheel | TimeLaw::Minco => Self::DEFAULT,
+            TimeLaw::Eq5 | TimeLaw::FixedPoint | TimeLaw::Printed | TimeLaw::Wheel => Self::Flat,
+            TimeLaw::Auto | TimeLaw::Optimal | TimeLaw::Minco => Self::DEFAULT,
         }
     }
 

@@ -1,6 +1,7 @@
 //! The time laws: which clock a leg gets, and by how much it is slowed down.
 
-use std::sync::Arc;
+pub(super) mod optimal;
+mod wheel;
 
 use crate::mission::TimeLaw;
 use crate::robot::RobotModel;
@@ -8,10 +9,8 @@ use crate::robot::RobotModel;
 use super::RetimeError;
 use super::convolution::Convolution;
 use super::course::{Course, Curved, Proportional};
-use super::limits::{Scope, append_turn, limits, planning};
-use super::metric::Metric;
-use super::optimal::{self, Problem};
-use super::peaks::{HELD_JUMP, peaks, slow_down};
+use super::limits::{Scope, append_turn, limits};
+use super::peaks::{Peaks, peaks, slow_down};
 use super::steered::time_steered;
 use super::timed_leg::{Clock, TimedLeg};
 use super::warp::Warp;
@@ -47,26 +46,7 @@ pub fn time_leg(course: &Course, law: TimeLaw, task: Task<'_>) -> Result<TimedLe
         Course::Curved(curved) => curved,
     };
     match law {
-        TimeLaw::Auto => {
-            let mut best: Option<TimedLeg> = None;
-            for law in [TimeLaw::Optimal, TimeLaw::Minco, TimeLaw::Eq5, TimeLaw::FixedPoint] {
-                let Ok(leg) = time_leg(course, law, task) else { continue };
-                if std::env::var("DBG").is_ok() {
-                    eprint!("{law:?} {:.4}; ", leg.duration());
-                }
-                let leg = if law == TimeLaw::Optimal { leg } else { guarded(TimedLeg { stretch: 1.0, ..leg }, task) };
-                if std::env::var("DBG").is_ok() {
-                    eprint!("guarded {:.4}; ", leg.duration());
-                }
-                if best.as_ref().is_none_or(|best| leg.duration() < best.duration()) {
-                    best = Some(leg);
-                }
-            }
-            if std::env::var("DBG").is_ok() {
-                eprintln!();
-            }
-            Ok(best.expect("fixed_point times every curve"))
-        }
+        TimeLaw::Auto => Ok(fastest(curved, task)),
         TimeLaw::FixedPoint => {
             let limits = centre_limits(task.robot);
             let speed = fixed_point_speed(curved, task.robot);
@@ -77,8 +57,8 @@ pub fn time_leg(course: &Course, law: TimeLaw, task: Task<'_>) -> Result<TimedLe
         TimeLaw::Printed => Err(RetimeError::PrintedNeedsOneSegment),
         TimeLaw::Minco if task.own_timing => Ok(own(curved, task)),
         TimeLaw::Minco => Err(RetimeError::NoOwnTiming),
-        TimeLaw::Optimal => optimal(curved, task),
-        TimeLaw::Wheel => Err(RetimeError::NotYet { law: super::law_key(law) }),
+        TimeLaw::Optimal => optimal::time(curved, task),
+        TimeLaw::Wheel => Ok(wheel::time(curved, task)),
     }
 }
 
@@ -100,6 +80,8 @@ fn proportional(course: &Proportional, robot: &RobotModel) -> TimedLeg {
     course.wheel_changes().iter().for_each(|change| keep(*change, robot.wheel.planning()));
     course.joint_changes.iter().zip(&robot.joints).for_each(|(change, joint)| keep(*change, joint.limits.planning()));
     keep(course.drive, [robot.base.speed, robot.base.acceleration, f64::INFINITY]);
+    // [SCR] Eq. 14 without a drive.
+    keep(course.turn, [2.0 * robot.base.eta * robot.base.speed / robot.track_width, f64::INFINITY, f64::INFINITY]);
     keep(course.turn, [robot.base.angular_speed, robot.base.angular_acceleration, f64::INFINITY]);
     let moves = limits[0].is_finite();
     TimedLeg {
@@ -133,12 +115,73 @@ fn convolved(
         speed_limit: limits[0],
         compensation: uncompensated - limits[0],
     };
-    slowed(leg, task)
+    slowed(leg, task, Scope::Actuators)
 }
 
-/// A leg slowed down until every limit holds.
-pub(super) fn slowed(leg: TimedLeg, task: Task<'_>) -> TimedLeg {
-    TimedLeg { stretch: slow_down(&leg.clock_peaks(true), &limits(task.robot, Scope::Actuators), task.hold), ..leg }
+/// The fastest law that keeps every limit, the base's included.
+///
+/// `optimal` is the fastest but for the size of its cells, so another law is tried only where it cannot be told to be slower beforehand.
+fn fastest(curved: &Curved, task: Task<'_>) -> TimedLeg {
+    let mut best = optimal::time(curved, task).ok();
+    let unlimited =
+        limits(task.robot, Scope::Actuators).iter().take(2 + task.robot.joints.len()).flatten().any(Option::is_none);
+    for law in [TimeLaw::Minco, TimeLaw::Eq5, TimeLaw::FixedPoint] {
+        let known = best.as_ref().map_or(f64::INFINITY, TimedLeg::duration);
+        // The optimiser's timing keeps a jerk limit only by being slowed down; without one it may be the fastest.
+        let hopeless = match law {
+            TimeLaw::Minco => best.is_some() && !unlimited,
+            _ => best.is_some() && least_duration(curved, law, task) >= known,
+        };
+        if hopeless {
+            continue;
+        }
+        let Ok(leg) = time_leg(&Course::Curved(curved.clone()), law, task) else { continue };
+        let leg = slowed(leg, task, Scope::Everything);
+        if leg.duration() < known {
+            best = Some(leg);
+        }
+    }
+    best.expect("fixed_point times every curve")
+}
+
+/// What `eq5` and `fixed_point` take at least: their profiles before any slow-down, for Eq. 5 compensated only for what the wheels differ
+/// by at the nodes of the curve.
+fn least_duration(curved: &Curved, law: TimeLaw, task: Task<'_>) -> f64 {
+    let [v, a, j] = centre_limits(task.robot);
+    let curve = &curved.curve;
+    let uncorrected = Convolution::fastest(curve.length(), [v, a, j]);
+    let bends = curve.nodes().map(|node| (curve.arc(node), curve.curvature(node)[0].abs()));
+    let wheel_speed = task.robot.wheel.planning()[0];
+    let speed = match law {
+        TimeLaw::Eq5 => {
+            let turns = bends.map(|(arc, bend)| bend * uncorrected.at(uncorrected.time_at(arc))[1]);
+            wheel_speed - curved.half_track * turns.fold(0.0, f64::max)
+        }
+        _ => wheel_speed / (1.0 + curved.half_track * bends.map(|(_, bend)| bend).fold(0.0, f64::max)),
+    };
+    if speed > 0.0 { Convolution::fastest(curve.length(), [v.min(speed), a, j]).duration() } else { f64::INFINITY }
+}
+
+/// Slowed down (from its clock's own speed) until every limit in the scope holds.
+pub(super) fn slowed(leg: TimedLeg, task: Task<'_>, scope: Scope) -> TimedLeg {
+    TimedLeg { stretch: slow_down(&peaks_of(&leg, task, scope), &limits(task.robot, scope), task.hold), ..leg }
+}
+
+/// Peaks before the slow-down of the rows that the scope limits.
+pub(super) fn peaks_of(leg: &TimedLeg, task: Task<'_>, scope: Scope) -> Peaks {
+    peaks(&leg.clock_breaks(), true, |t, out| {
+        let first = out.len();
+        leg.clock_rates(t, out);
+        if scope == Scope::Everything {
+            append_turn(task.robot, first, out);
+        }
+    })
+}
+
+/// The largest speed of the centre, m/s, where the profile was not made with one.
+pub(super) fn with_peak_speed(leg: TimedLeg, peaks: &Peaks, task: Task<'_>) -> TimedLeg {
+    let centre = peaks.rates[2 + task.robot.joints.len()][0];
+    TimedLeg { speed_limit: centre / leg.stretch, ..leg }
 }
 
 /// \[CONV\] Eq. 5, applied once: the speed limit less what the wheels differ by under the uncorrected profile.
@@ -238,92 +281,9 @@ fn own(curved: &Curved, task: Task<'_>) -> TimedLeg {
         }
     }
     let leg = leg(best.1);
-    let peaks = leg.clock_peaks(true);
+    let peaks = peaks_of(&leg, task, Scope::Actuators);
     let stretch = slow_down(&peaks, &limits, task.hold);
-    let centre = peaks.rates.last().map_or(0.0, |rates| rates[0]);
-    TimedLeg { stretch, speed_limit: centre / stretch, ..leg }
-}
-
-/// The least time under all limits.
-///
-/// # Errors
-/// It was not found.
-fn optimal(curved: &Curved, task: Task<'_>) -> Result<TimedLeg, RetimeError> {
-    let limits = planning(task.robot);
-    let metric = Metric::new(&curved.curve, |place| {
-        // The mean square of what the rows are of their limits.
-        let mut rows = Vec::with_capacity(limits.len());
-        curved.rates(place, [1.0, 0.0, 0.0], &mut rows);
-        let mut square = [0.0; 2];
-        for ([d1, d2, _], [limit, ..]) in rows[..rows.len() - 1].iter().zip(&limits) {
-            let weight = 0.5 / (limit * limit);
-            square[0] += weight * d1 * d1;
-            square[1] += weight * d1 * d2;
-        }
-        let rate = square[0].sqrt();
-        [rate, square[1] / rate]
-    });
-    let [speed, acceleration, jerk] = limits[0];
-    let profile = Convolution::fastest(metric.length(), [1.0, acceleration / speed, jerk / speed]);
-    let clock = Clock::Metric(Arc::new(metric), profile);
-    let leg = TimedLeg {
-        course: Course::Curved(curved.clone()),
-        clock,
-        stretch: 1.0,
-        law: Some(TimeLaw::Optimal),
-        speed_limit: 0.0,
-        compensation: 0.0,
-    };
-    paced(leg, task)
-}
-
-/// A leg at the pace of the least time under all limits; its clock is the reference.
-///
-/// # Errors
-/// The least time was not found.
-pub(super) fn paced(leg: TimedLeg, task: Task<'_>) -> Result<TimedLeg, RetimeError> {
-    let limits = planning(task.robot);
-    let [_, acceleration, jerk] = limits[0];
-    let pace = {
-        let rates = |t: f64, out: &mut Vec<[f64; 3]>| {
-            let first = out.len();
-            leg.clock_rates(t, out);
-            append_turn(task.robot, first, out);
-        };
-        let problem = Problem {
-            breaks: &leg.clock_breaks(),
-            limits: &limits,
-            jerk_of_jump: HELD_JUMP / task.hold,
-            step: 0.125 * acceleration / jerk,
-        };
-        optimal::fastest(&problem, rates).ok_or(RetimeError::NoOptimum { leg: task.leg })?
-    };
-    let leg = TimedLeg { clock: Clock::Paced(Box::new(leg.clock), pace), ..leg };
-    Ok(guarded(leg, task))
-}
-
-/// Slowed down until every limit holds, the base's included.
-pub(super) fn guarded(leg: TimedLeg, task: Task<'_>) -> TimedLeg {
-    let found = peaks(&leg.clock_breaks(), true, |t, out| {
-        let first = out.len();
-        leg.clock_rates(t, out);
-        append_turn(task.robot, first, out);
-    });
-    let stretch = slow_down(&found, &limits(task.robot, Scope::Everything), task.hold);
-    if std::env::var("DBG").is_ok() && leg.law == Some(TimeLaw::Optimal) {
-        let l = limits(task.robot, Scope::Everything);
-        eprintln!(
-            "stretch {stretch:.5} {:?}",
-            found
-                .rates
-                .iter()
-                .zip(&l)
-                .map(|(r, l)| [0, 1, 2].map(|k| (1e4 * r[k] / l[k].unwrap_or(1e9)).round() / 1e4))
-                .collect::<Vec<_>>()
-        );
-    }
-    let centre = found.rates[found.rates.len() - 3][0];
-    TimedLeg { stretch, speed_limit: centre / stretch, ..leg }
+    with_peak_speed(TimedLeg { stretch, ..leg }, &peaks, task)
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! Stage 8: when to be where on the path: time laws under wheel and joint limits.
 //!
 //! Every leg is a curve q = (left wheel, right wheel, joints) of one parameter ([`course`]). A law makes that parameter a function
-//! of time ([`convolution`], [`warp`]); joints are carried along, so no law changes the set of poses and postures. Then each leg is
-//! slowed down uniformly until every limit holds ([`peaks`]).
+//! of time ([`convolution`], [`warp`], [`optimal`]); joints are carried along, so no law changes the set of poses and postures. Then each
+//! leg is slowed down uniformly until every limit holds ([`limits`], [`peaks`]).
 
 pub mod convolution;
 pub mod course;
@@ -39,12 +39,6 @@ pub struct RetimeOptions {
 /// Why a trajectory has no profile under a law.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RetimeError {
-    /// A law of a later version.
-    #[error("time law `{law}` is not there yet")]
-    NotYet {
-        /// Its key in the mission.
-        law: &'static str,
-    },
     /// Eq. 2 as printed is no arc-length inverse, and on several segments not even a parameter.
     #[error(
         "time law `printed` needs a given path of one cubic Bezier segment: u = s/B_d has no meaning on anything else"
@@ -69,6 +63,14 @@ pub enum RetimeError {
         half_track: f64,
         /// v' of Eq. 5, m/s; not above zero, or as good as zero.
         left: f64,
+    },
+    /// A law of plane curves, on a leg of heading and arc length.
+    #[error("time law `{law}` times plane curves, and leg {leg} is planned by heading and arc length")]
+    NeedsFlat {
+        /// Its key in the mission.
+        law: &'static str,
+        /// Index of the leg.
+        leg: usize,
     },
     /// A law of the arc length, on a leg that goes on moving while the arc length stands.
     #[error(
@@ -121,9 +123,6 @@ pub enum RetimeError {
 impl Describe for RetimeError {
     fn diagnostic(&self) -> Diagnostic {
         match self {
-            Self::NotYet { .. } => {
-                Diagnostic::error("retime/not-yet", self).hint("use auto, fixed_point, eq5, printed or minco")
-            }
             Self::PrintedNeedsOneSegment => Diagnostic::error("retime/printed-needs-one-segment", self)
                 .hint("use eq5: the same law with the true inverse of the arc length"),
             Self::NoOwnTiming => Diagnostic::error("retime/no-own-timing", self).hint("use auto, fixed_point or eq5"),
@@ -133,6 +132,9 @@ impl Describe for RetimeError {
                     .number("radius_m", *radius)
                     .number("half_track_m", *half_track)
                     .number("v_max_mps", *left)
+            }
+            Self::NeedsFlat { .. } => {
+                Diagnostic::failure("retime/needs-flat", self).hint("use auto or optimal, or `parameterisation: flat`")
             }
             Self::StandsInside { time, .. } => Diagnostic::failure("retime/stands-inside", self)
                 .hint("use auto or minco, or `parameterisation: flat`, which stops there")
@@ -175,9 +177,6 @@ pub fn retime(
     let hold = options.sampling_time;
     if !(hold.is_finite() && hold > 0.0) {
         return Err(RetimeError::SamplingTime { sampling_time: hold });
-    }
-    if matches!(options.law, TimeLaw::Wheel) {
-        return Err(RetimeError::NotYet { law: law_key(options.law) });
     }
     let given = trajectory.source == TrajectorySource::Given;
     if options.law == TimeLaw::Minco && given {

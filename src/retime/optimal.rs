@@ -13,11 +13,17 @@
 
 mod barrier;
 mod grid;
+mod guess;
 mod pace;
 
 pub use pace::Pace;
 
 use grid::Grid;
+
+/// Cells are this short compared with a build-up of acceleration.
+const STEP: f64 = 0.15;
+/// A row's speed over its limit that counts as none, so that what the limit allows stays finite.
+const STILL: f64 = 1e-100;
 
 /// A curve in actuator space with its reference clock, and what must hold along it.
 #[derive(Debug, Clone, Copy)]
@@ -34,13 +40,19 @@ pub struct Problem<'a> {
     pub step: f64,
 }
 
+/// A good [`Problem::step`] for a row: a share of the time in which it builds up its acceleration, or as much of it as it needs for its
+/// speed. A tenth of a percent or two of the least time are lost to it.
+pub fn step([speed, acceleration, jerk]: [f64; 3]) -> f64 {
+    STEP * (acceleration / jerk).min((speed / jerk).sqrt())
+}
+
 /// The fastest clock for the curve that `rates` gives (appends every row's first three derivatives at a reference time), limits kept at
 /// the grid's points: between them they may be exceeded by a little. `None`: the curve does not move, or is not finite.
 pub fn fastest(problem: &Problem<'_>, mut rates: impl FnMut(f64, &mut Vec<[f64; 3]>)) -> Option<Pace> {
     let grid = Grid::new(problem, &mut rates)?;
-    let solution = barrier::solve(problem, &grid)?;
-    if std::env::var("DBG").is_ok() {
-        eprintln!("cells {} steps {}", grid.cells(), solution.steps);
-    }
-    Some(Pace::new(&grid.knots, solution.cells.into_iter()))
+    let cells = barrier::solve(problem, &grid)?;
+    Some(Pace::new(&grid.knots, cells.into_iter()))
 }
+
+#[cfg(test)]
+mod tests;

@@ -13,7 +13,8 @@ use crate::trajectory::steered_curve::SteeredCurve;
 use super::RetimeError;
 use super::convolution::Convolution;
 use super::course::{Course, Proportional, STRAIGHT, compose};
-use super::law::{LEAST_SPEED, Task, centre_limits, guarded, paced, slowed};
+use super::law::{LEAST_SPEED, Task, centre_limits, optimal, peaks_of, slowed, with_peak_speed};
+use super::limits::Scope;
 use super::peaks::peaks;
 use super::timed_leg::{Clock, TimedLeg};
 
@@ -170,12 +171,9 @@ pub(super) fn time_steered(steered: &Steered, law: TimeLaw, task: Task<'_>) -> R
     let limits = centre_limits(task.robot);
     match law {
         TimeLaw::Auto => {
-            let best = guarded(TimedLeg { stretch: 1.0, ..own(steered, task) }, task);
+            // The least time is sought from the optimiser's own, so nothing else can be faster.
             let least = time_steered(steered, TimeLaw::Optimal, task);
-            if std::env::var("DBG").is_ok() {
-                eprintln!("own {:.3} optimal {:?}", best.duration(), least.as_ref().map(|l| l.duration()));
-            }
-            Ok(least.ok().filter(|leg| leg.duration() < best.duration()).unwrap_or(best))
+            Ok(least.unwrap_or_else(|_| slowed(at_own_time(steered), task, Scope::Everything)))
         }
         TimeLaw::Minco => Ok(own(steered, task)),
         TimeLaw::FixedPoint => {
@@ -185,7 +183,7 @@ pub(super) fn time_steered(steered: &Steered, law: TimeLaw, task: Task<'_>) -> R
             if speed.is_nan() || speed <= LEAST_SPEED * limits[0] {
                 return Err(no_speed(steered, law, task, speed));
             }
-            Ok(slowed(convolved(steered, law, speed, task.robot), task))
+            Ok(slowed(convolved(steered, law, speed, task.robot), task, Scope::Actuators))
         }
         TimeLaw::Eq5 => {
             drivable(steered, law, task)?;
@@ -201,27 +199,31 @@ pub(super) fn time_steered(steered: &Steered, law: TimeLaw, task: Task<'_>) -> R
             if left.is_nan() || left <= LEAST_SPEED * limits[0] {
                 return Err(no_speed(steered, law, task, left));
             }
-            Ok(slowed(convolved(steered, law, left.min(limits[0]), task.robot), task))
+            Ok(slowed(convolved(steered, law, left.min(limits[0]), task.robot), task, Scope::Actuators))
         }
         TimeLaw::Printed => Err(RetimeError::PrintedNeedsOneSegment),
-        TimeLaw::Optimal => paced(TimedLeg { stretch: 1.0, law: Some(law), ..own(steered, task) }, task),
-        TimeLaw::Wheel => Err(RetimeError::NotYet { law: super::law_key(law) }),
+        TimeLaw::Optimal => optimal::paced(TimedLeg { law: Some(law), ..at_own_time(steered) }, task),
+        TimeLaw::Wheel => Err(RetimeError::NeedsFlat { law: super::law_key(law), leg: task.leg }),
     }
 }
 
-/// The optimiser's own timing, from rest to rest by itself: only slowed down.
-fn own(steered: &Steered, task: Task<'_>) -> TimedLeg {
-    let leg = TimedLeg {
+/// The optimiser's own timing, from rest to rest by itself, before any slow-down.
+fn at_own_time(steered: &Steered) -> TimedLeg {
+    TimedLeg {
         course: Course::Steered(steered.clone()),
         clock: Clock::Seconds(steered.curve.duration()),
         stretch: 1.0,
         law: Some(TimeLaw::Minco),
         speed_limit: 0.0,
         compensation: 0.0,
-    };
-    let leg = slowed(leg, task);
-    let centre = leg.clock_peaks(false).rates.last().map_or(0.0, |rates| rates[0]);
-    TimedLeg { speed_limit: centre / leg.stretch, ..leg }
+    }
+}
+
+/// The optimiser's own timing: only slowed down.
+fn own(steered: &Steered, task: Task<'_>) -> TimedLeg {
+    let leg = slowed(at_own_time(steered), task, Scope::Actuators);
+    let peaks = peaks_of(&leg, task, Scope::Actuators);
+    with_peak_speed(leg, &peaks, task)
 }
 
 /// A convolution profile of the distance driven.

@@ -22,7 +22,7 @@ fn course(trajectory: &Trajectory) -> Curved {
     let [Leg::Drive(drive)] = trajectory.legs.as_slice() else { panic!("one drive") };
     match Course::drive(drive, 0.4).unwrap() {
         Course::Curved(curved) => curved,
-        Course::Proportional(_) | Course::Steered(_) => panic!("a curve"),
+        _ => panic!("a curve"),
     }
 }
 
@@ -69,30 +69,32 @@ fn a_straight_line_takes_the_known_time_under_every_law_that_may_time_it() {
 }
 
 #[test]
-fn dbg_optimal() {
+fn optimal_takes_the_least_time_that_an_independent_solver_finds() {
     let robot = fixtures::conv();
-    for (name, best) in [("line", 11.5), ("c_curve", 17.4432), ("s_curve", 17.1396), ("arbitrary", 12.0655)] {
-        if name == "line" {
-            continue;
+    for name in ["c_curve", "s_curve", "arbitrary"] {
+        let row = &vectors()["paths"][name];
+        let [least, without_jerk] = ["optimum", "toppra"].map(|key| row[key]["time"].as_f64().unwrap());
+        let leg = time_leg(&Course::Curved(course(&path(name))), TimeLaw::Optimal, task(&robot, false)).unwrap();
+        let over = leg.duration() / least - 1.0;
+        // The solver keeps limits at its nodes only: its own peaks are up to 1e-4 over.
+        assert!((-1e-4..5e-3).contains(&over), "{name}: {} s, {least} s", leg.duration());
+        assert!(leg.duration() > without_jerk);
+    }
+}
+
+#[test]
+fn wheel_is_the_optimum_where_curvature_keeps_its_sign() {
+    let robot = fixtures::conv();
+    let time = |name: &str, law| time_leg(&Course::Curved(course(&path(name))), law, task(&robot, false)).unwrap();
+    for name in ["c_curve", "s_curve", "arbitrary"] {
+        let metric = vectors()["paths"][name]["wheel_metric"]["time"].as_f64().unwrap();
+        let leg = time(name, TimeLaw::Wheel);
+        let (before, after) = (leg.duration() / leg.stretch, leg.duration());
+        if name == "c_curve" {
+            assert!((after / metric - 1.0).abs() < 1e-3, "{after} {metric}");
         }
-        let (trajectory, task) = (path(name), task(&robot, false));
-        let curved = course(&trajectory);
-        let mut times = vec![];
-        let mut leg = None;
-        for _ in 0..10 {
-            let t = std::time::Instant::now();
-            leg = Some(optimal(&curved, task).unwrap());
-            times.push(t.elapsed().as_secs_f64() * 1e3);
-        }
-        let leg = leg.unwrap();
-        times.sort_by(f64::total_cmp);
-        eprintln!(
-            "{name}: {} ({:+.3} %) stretch {} before {:+.3} %, {:.2} ms",
-            leg.duration(),
-            (leg.duration() / best - 1.0) * 100.0,
-            leg.stretch,
-            (leg.duration() / leg.stretch / best - 1.0) * 100.0,
-            times[0]
-        );
+        // Rounded at inflections, the metric is a little longer.
+        assert!((-1e-3..0.03).contains(&(before / metric - 1.0)), "{name}: {before} {metric}");
+        assert!(after > time(name, TimeLaw::Optimal).duration() * (1.0 - 1e-3));
     }
 }

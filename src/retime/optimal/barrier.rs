@@ -9,44 +9,35 @@
 
 use crate::math::pentadiagonal::Pentadiagonal;
 
-use super::Problem;
 use super::grid::Grid;
+use super::guess::guess;
+use super::{Problem, STILL};
 
 /// Points of a cell: start, middle, end, and their weights (Simpson).
 const POINTS: [(f64, f64); 3] = [(0.0, 1.0 / 6.0), (0.5, 4.0 / 6.0), (1.0, 1.0 / 6.0)];
 /// Steps at most.
 const STEPS: usize = 80;
 /// It ends where the time is known to be within this share of the least (on the grid, as far as it is convex).
-const GAP: f64 = 3e-5;
+const GAP: f64 = 2e-4;
 /// No constraint shrinks by more in a step.
 const TO_BOUNDARY: f64 = 0.01;
 /// A multiplier stays within this factor of what the constraint's value asks for.
 const CENTRED: f64 = 1e3;
 /// Least share of the objective's curvature that is kept.
 const LEAST_CURVATURE: f64 = 0.05;
-/// A row's speed over its limit that counts as none, so that the cap stays finite.
-const STILL: f64 = 1e-100;
 /// The start is below the fastest scaling of its shape by this factor in b.
 const START_INSIDE: f64 = 0.6;
 
-/// The cells' polynomials (p0, p1, p2 of b) of the least time.
-pub(super) fn solve(problem: &Problem<'_>, grid: &Grid) -> Option<Solution> {
+/// The least time's b: p0, p1, p2 of each cell, in powers of the reference time since the cell's start.
+pub(super) fn solve(problem: &Problem<'_>, grid: &Grid) -> Option<Vec<[f64; 3]>> {
     let mut barrier = Barrier::new(problem, grid);
-    let mut x = barrier.start(grid)?;
-    let steps = barrier.descend(&mut x);
+    let mut x = barrier.start(guess(problem, grid))?;
+    barrier.descend(&mut x);
     let cells = (0..grid.cells()).map(|cell| {
         let basis = grid.basis(cell);
         [0, 1, 2].map(|k| (0..3).map(|i| basis[k][i] * x[cell + i]).sum::<f64>())
     });
-    Some(Solution { cells: cells.collect(), steps })
-}
-
-/// What was found.
-pub(super) struct Solution {
-    /// p0, p1, p2 of each cell.
-    pub cells: Vec<[f64; 3]>,
-    /// Newton steps taken.
-    pub steps: usize,
+    Some(cells.collect())
 }
 
 struct Barrier {
@@ -57,11 +48,11 @@ struct Barrier {
     jerk: Vec<[f64; 4]>,
     accelerations: usize,
     jerks: usize,
-    /// Multipliers of the caps, the unknowns' signs, both sides of accelerations and jerks.
-    on_cap: Vec<f64>,
-    on_sign: Vec<f64>,
-    on_acceleration: Vec<[f64; 2]>,
-    on_jerk: Vec<[f64; 2]>,
+    caps: Vec<Constraint>,
+    signs: Vec<Constraint>,
+    /// Both sides of each.
+    on_acceleration: Vec<[Constraint; 2]>,
+    on_jerk: Vec<[Constraint; 2]>,
     hessian: Pentadiagonal,
 }
 
@@ -120,10 +111,10 @@ impl Barrier {
             }
         }
         Self {
-            on_cap: vec![0.0; points.len()],
-            on_sign: vec![0.0; grid.cells() + 2],
-            on_acceleration: vec![[0.0; 2]; acceleration.len()],
-            on_jerk: vec![[0.0; 2]; jerk.len()],
+            caps: vec![Constraint::default(); points.len()],
+            signs: vec![Constraint::default(); grid.cells() + 2],
+            on_acceleration: vec![Default::default(); acceleration.len()],
+            on_jerk: vec![Default::default(); jerk.len()],
             points,
             acceleration,
             jerk,
@@ -138,21 +129,8 @@ impl Barrier {
     }
 
     /// Unknowns strictly inside all limits: of two shapes, each scaled to the limits, the faster one.
-    fn start(&self, grid: &Grid) -> Option<Vec<f64>> {
-        let unknowns = grid.cells() + 2;
-        let pointwise = |i: usize| {
-            let at = |knot: usize| grid.slowness[knot].powi(-2);
-            0.5 * (at(i.saturating_sub(1).min(grid.cells())) + at(i.min(grid.cells())))
-        };
-        let mut smooth: Vec<f64> = (0..unknowns).map(pointwise).collect();
-        for _ in 0..4 {
-            let before = smooth.clone();
-            for i in 1..unknowns - 1 {
-                smooth[i] = 0.25 * before[i - 1] + 0.5 * before[i] + 0.25 * before[i + 1];
-            }
-        }
-        let shapes = [vec![1.0; unknowns], smooth];
-        let scaled = shapes.into_iter().filter_map(|shape| {
+    fn start(&self, guess: Vec<f64>) -> Option<Vec<f64>> {
+        let scaled = [vec![1.0; guess.len()], guess].into_iter().filter_map(|shape| {
             let scale = START_INSIDE * self.largest_scale(&shape);
             let x: Vec<f64> = shape.iter().map(|x| x * scale).collect();
             let time = self.time(&x);
@@ -170,11 +148,12 @@ impl Barrier {
             for [a0, a1] in &self.acceleration[i * self.accelerations..(i + 1) * self.accelerations] {
                 inverse = inverse.max((a0 * b + a1 * b1).abs());
             }
+            let root = b.sqrt();
             for [j0, j1, j2, k] in &self.jerk[i * self.jerks..(i + 1) * self.jerks] {
                 // Each of the two parts within half the limit where a jump takes one.
-                let own = (b.sqrt() * (j0 * b + j1 * b1 + j2 * b2)).abs();
+                let own = (root * (j0 * b + j1 * b1 + j2 * b2)).abs();
                 let half = if *k > 0.0 { 2.0 } else { 1.0 };
-                inverse = inverse.max((half * own).powf(2.0 / 3.0)).max(half * k * b);
+                inverse = inverse.max((half * own).cbrt().powi(2)).max(half * k * b);
             }
         }
         1.0 / inverse
@@ -185,74 +164,93 @@ impl Barrier {
     }
 
     fn constraints(&self) -> usize {
-        self.on_cap.len() + self.on_sign.len() + 2 * (self.on_acceleration.len() + self.on_jerk.len())
+        self.caps.len() + self.signs.len() + 2 * (self.acceleration.len() + self.jerk.len())
     }
 
-    /// Newton steps until the gap is closed. Returns their number.
-    fn descend(&mut self, x: &mut Vec<f64>) -> usize {
+    /// Newton steps until the gap is closed, or none helps.
+    fn descend(&mut self, x: &mut Vec<f64>) {
         let mut mu = 0.1 * self.time(x) / self.constraints() as f64;
-        self.centre(x, mu);
         let mut step = vec![0.0; x.len()];
-        let mut trial = x.clone();
-        for taken in 0..STEPS {
-            self.direction(x, mu, &mut step);
-            let share = self.advance(x, &step, mu, &mut trial);
-            if share <= 0.0 {
-                return taken;
-            }
-            self.follow(x, &step, &trial, mu);
-            std::mem::swap(x, &mut trial);
-            if share > 0.5 && self.constraints() as f64 * mu <= GAP * self.time(x) {
-                return taken + 1;
-            }
-            mu *= if share > 0.9 {
-                0.15
-            } else if share > 0.5 {
-                0.4
-            } else {
-                1.0
+        let mut next = x.clone();
+        let Some(mut value) = self.assemble(x, mu, true, &mut step) else { return };
+        for _ in 0..STEPS {
+            self.hessian.factor();
+            self.hessian.solve(&mut step);
+            let mut share = self.reach(x, &step, mu);
+            let after = mu
+                * if share > 0.9 {
+                    0.2
+                } else if share > 0.5 {
+                    0.4
+                } else {
+                    1.0
+                };
+            let direction = step.clone();
+            // Within reach all limits hold; the barrier function falls for a part of it at least.
+            let found = loop {
+                for i in 0..x.len() {
+                    next[i] = x[i] + share * direction[i];
+                }
+                let found = self.assemble(&next, after, false, &mut step);
+                match found {
+                    Some(found) if found.merit(mu) <= value.merit(mu) * (1.0 + 1e-12) => break Some(found),
+                    _ if share < 1e-6 => break None,
+                    _ => share *= 0.4,
+                }
             };
-        }
-        STEPS
-    }
-
-    /// Multipliers on the central path.
-    fn centre(&mut self, x: &[f64], mu: f64) {
-        for (on, x) in self.on_sign.iter_mut().zip(x) {
-            *on = mu / x;
-        }
-        for (i, point) in self.points.iter().enumerate() {
-            let [b, b1, b2] = point.values(x, Self::cell(i));
-            self.on_cap[i] = mu / (point.cap - b);
-            for row in i * self.accelerations..(i + 1) * self.accelerations {
-                self.on_acceleration[row] = sides(&self.acceleration[row], b, b1).map(|c| mu / c);
+            let Some(found) = found else { return };
+            std::mem::swap(x, &mut next);
+            value = found;
+            if share > 0.5 && self.constraints() as f64 * mu <= GAP * value.time {
+                return;
             }
-            for row in i * self.jerks..(i + 1) * self.jerks {
-                self.on_jerk[row] = jerk_sides(&self.jerk[row], [b, b1, b2]).map(|c| mu / c);
-            }
+            mu = after;
         }
     }
 
-    /// Newton's direction for a barrier weight.
-    fn direction(&mut self, x: &[f64], mu: f64, step: &mut [f64]) {
+    /// Newton's system at some unknowns: fills the Hessian and the downhill gradient of the barrier function with weight `mu`, and the
+    /// slacks. `fresh`: multipliers are put on the central path; otherwise they are kept near it. `None`: a limit is broken.
+    fn assemble(&mut self, x: &[f64], mu: f64, fresh: bool, gradient: &mut [f64]) -> Option<Value> {
+        let keep = |on: &mut f64, slack: f64| {
+            let central = mu / slack;
+            *on = if fresh { central } else { on.clamp(central / CENTRED, central * CENTRED) };
+            *on
+        };
+        let mut value = Value::default();
         self.hessian.reset(x.len());
-        for i in 0..x.len() {
-            self.hessian.rows[i][0] = self.on_sign[i] / x[i];
-            step[i] = mu / x[i];
+        for (i, sign) in self.signs.iter_mut().enumerate() {
+            if x[i] <= 0.0 {
+                return None;
+            }
+            sign.slack = x[i];
+            self.hessian.rows[i][0] = keep(&mut sign.on, x[i]) / x[i];
+            gradient[i] = mu / x[i];
+            value.logs += x[i].ln();
         }
         for (i, point) in self.points.iter().enumerate() {
             let cell = Self::cell(i);
             let [b, b1, b2] = point.values(x, cell);
-            let r = 1.0 / b.sqrt();
+            let root = b.sqrt();
+            let r = 1.0 / root;
             let (r1, r2) = (-0.5 * r / b, 0.75 * r / (b * b));
             let cap = point.cap - b;
+            let mut least = cap;
+            let mut product = cap;
+            value.time += point.weight * r;
             // Gradient of the barrier function and Hessian in (b, b1, b2).
+            let on = &mut self.caps[i];
+            on.slack = cap;
             let mut g = [point.weight * r1 + mu / cap, 0.0, 0.0];
-            let mut h = [self.on_cap[i] / cap, 0.0, 0.0, 0.0, 0.0, 0.0];
-            for row in i * self.accelerations..(i + 1) * self.accelerations {
-                let [a0, a1] = self.acceleration[row];
-                let c = sides(&self.acceleration[row], b, b1).map(f64::recip);
-                let [low, high] = self.on_acceleration[row];
+            let mut h = [keep(&mut on.on, cap) / cap, 0.0, 0.0, 0.0, 0.0, 0.0];
+            let rows = i * self.accelerations..(i + 1) * self.accelerations;
+            for ([a0, a1], on) in self.acceleration[rows.clone()].iter().zip(&mut self.on_acceleration[rows]) {
+                let l = a0 * b + a1 * b1;
+                let slack = [1.0 - l, 1.0 + l];
+                least = least.min(slack[0]).min(slack[1]);
+                product *= slack[0] * slack[1];
+                [on[0].slack, on[1].slack] = slack;
+                let c = slack.map(f64::recip);
+                let (low, high) = (keep(&mut on[0].on, slack[0]), keep(&mut on[1].on, slack[1]));
                 let (force, stiff) = (mu * (c[0] - c[1]), low * c[0] + high * c[1]);
                 g[0] += force * a0;
                 g[1] += force * a1;
@@ -261,10 +259,16 @@ impl Barrier {
                 h[2] += stiff * a1 * a1;
             }
             let mut curvature = point.weight * r2;
-            for row in i * self.jerks..(i + 1) * self.jerks {
-                let [j0, j1, j2, k] = self.jerk[row];
-                let c = jerk_sides(&self.jerk[row], [b, b1, b2]).map(f64::recip);
-                let [low, high] = self.on_jerk[row];
+            let rows = i * self.jerks..(i + 1) * self.jerks;
+            for ([j0, j1, j2, k], on) in self.jerk[rows.clone()].iter().zip(&mut self.on_jerk[rows]) {
+                let l = j0 * b + j1 * b1 + j2 * b2;
+                let room = r - k * root;
+                let slack = [room - l, room + l];
+                least = least.min(slack[0]).min(slack[1]);
+                product *= slack[0] * slack[1];
+                [on[0].slack, on[1].slack] = slack;
+                let c = slack.map(f64::recip);
+                let (low, high) = (keep(&mut on[0].on, slack[0]), keep(&mut on[1].on, slack[1]));
                 let d = r1 - 0.5 * k * r;
                 curvature -= (low + high) * (r2 + 0.25 * k * r / b);
                 let (sum, difference) = (mu * (c[0] + c[1]), mu * (c[0] - c[1]));
@@ -280,6 +284,10 @@ impl Barrier {
                 h[4] += sum * j1 * j2;
                 h[5] += sum * j2 * j2;
             }
+            if least <= 0.0 {
+                return None;
+            }
+            value.logs += product.ln();
             h[0] += curvature.max(LEAST_CURVATURE * point.weight * r2);
             let [e0, e1, e2] = &point.basis;
             let mut block = [0.0; 6];
@@ -290,7 +298,7 @@ impl Barrier {
                     h[1] * e0[m] + h[2] * e1[m] + h[4] * e2[m],
                     h[3] * e0[m] + h[4] * e1[m] + h[5] * e2[m],
                 ];
-                step[cell + m] -= g[0] * e0[m] + g[1] * e1[m] + g[2] * e2[m];
+                gradient[cell + m] -= g[0] * e0[m] + g[1] * e1[m] + g[2] * e2[m];
                 for n in 0..=m {
                     block[entry] = image[0] * e0[n] + image[1] * e1[n] + image[2] * e2[n];
                     entry += 1;
@@ -298,112 +306,62 @@ impl Barrier {
             }
             self.hessian.add(cell, block);
         }
-        self.hessian.factor();
-        self.hessian.solve(step);
+        Some(value)
     }
 
-    /// Goes along a step as far as every constraint keeps a share of its value and the barrier function falls. Returns the share of
-    /// the step taken, 0 where none helps.
-    fn advance(&self, x: &[f64], step: &[f64], mu: f64, trial: &mut [f64]) -> f64 {
-        let before = self.merit(x, mu, None);
-        let mut share = 1.0;
-        for _ in 0..40 {
-            for i in 0..x.len() {
-                trial[i] = x[i] + share * step[i];
-            }
-            let after = self.merit(trial, mu, Some(x));
-            if after <= before + 1e-12 * before.abs() {
-                return share;
-            }
-            share *= 0.6;
-        }
-        0.0
-    }
-
-    /// Time less `mu` times the logarithms of all constraints; infinite where one is below a share of its value at `from`.
-    fn merit(&self, x: &[f64], mu: f64, from: Option<&[f64]>) -> f64 {
-        let mut time = 0.0;
-        let mut logs = 0.0;
-        for (i, value) in x.iter().enumerate() {
-            if *value <= from.map_or(0.0, |from| TO_BOUNDARY * from[i]) {
-                return f64::INFINITY;
-            }
-            logs += value.ln();
-        }
-        for (i, point) in self.points.iter().enumerate() {
-            let at = point.values(x, Self::cell(i));
-            let least = from.map(|from| point.values(from, Self::cell(i)));
-            let c = point.cap - at[0];
-            if c <= least.map_or(0.0, |least| TO_BOUNDARY * (point.cap - least[0])) {
-                return f64::INFINITY;
-            }
-            let mut product = c;
-            for row in i * self.accelerations..(i + 1) * self.accelerations {
-                let c = sides(&self.acceleration[row], at[0], at[1]);
-                let least = least.map_or([0.0; 2], |l| sides(&self.acceleration[row], l[0], l[1]));
-                if c[0] <= TO_BOUNDARY * least[0] || c[1] <= TO_BOUNDARY * least[1] {
-                    return f64::INFINITY;
-                }
-                product *= c[0] * c[1];
-            }
-            for row in i * self.jerks..(i + 1) * self.jerks {
-                let c = jerk_sides(&self.jerk[row], at);
-                let least = least.map_or([0.0; 2], |least| jerk_sides(&self.jerk[row], least));
-                if c[0] <= TO_BOUNDARY * least[0] || c[1] <= TO_BOUNDARY * least[1] {
-                    return f64::INFINITY;
-                }
-                logs += (c[0] * c[1]).ln();
-            }
-            logs += product.ln();
-            time += point.weight / at[0].sqrt();
-        }
-        time - mu * logs
-    }
-
-    /// Newton's multipliers, kept near what the constraints at the new unknowns ask for.
-    fn follow(&mut self, x: &[f64], step: &[f64], to: &[f64], mu: f64) {
-        let update = |on: &mut f64, c: f64, change: f64, after: f64| {
-            *on = (mu - *on * change) / c;
-            *on = on.clamp(mu / (CENTRED * after), CENTRED * mu / after);
+    /// How far along a step every constraint keeps a share of its slack, at most 1; and Newton's multipliers.
+    ///
+    /// The slacks of the jerk are convex in b, so where their tangents are positive, they are.
+    fn reach(&mut self, x: &[f64], step: &[f64], mu: f64) -> f64 {
+        let mut fastest = 1.0 - TO_BOUNDARY;
+        let mut follow = |on: &mut Constraint, change: f64| {
+            let inverse = 1.0 / on.slack;
+            fastest = fastest.max(-change * inverse);
+            on.on = (mu - on.on * change) * inverse;
         };
-        for i in 0..x.len() {
-            update(&mut self.on_sign[i], x[i], step[i], to[i]);
+        for (sign, step) in self.signs.iter_mut().zip(step) {
+            follow(sign, *step);
         }
         for (i, point) in self.points.iter().enumerate() {
             let cell = Self::cell(i);
-            let (at, by, end) = (point.values(x, cell), point.values(step, cell), point.values(to, cell));
-            update(&mut self.on_cap[i], point.cap - at[0], -by[0], point.cap - end[0]);
-            for row in i * self.accelerations..(i + 1) * self.accelerations {
-                let weights = &self.acceleration[row];
-                let (c, after) = (sides(weights, at[0], at[1]), sides(weights, end[0], end[1]));
-                let change = weights[0] * by[0] + weights[1] * by[1];
-                let [low, high] = &mut self.on_acceleration[row];
-                update(low, c[0], -change, after[0]);
-                update(high, c[1], change, after[1]);
+            let by = point.values(step, cell);
+            let b = point.values(x, cell)[0];
+            follow(&mut self.caps[i], -by[0]);
+            let rows = i * self.accelerations..(i + 1) * self.accelerations;
+            for ([a0, a1], [low, high]) in self.acceleration[rows.clone()].iter().zip(&mut self.on_acceleration[rows]) {
+                let change = a0 * by[0] + a1 * by[1];
+                follow(low, -change);
+                follow(high, change);
             }
-            let r = 1.0 / at[0].sqrt();
-            for row in i * self.jerks..(i + 1) * self.jerks {
-                let [j0, j1, j2, k] = self.jerk[row];
-                let (c, after) = (jerk_sides(&self.jerk[row], at), jerk_sides(&self.jerk[row], end));
+            let r = 1.0 / b.sqrt();
+            let rows = i * self.jerks..(i + 1) * self.jerks;
+            for ([j0, j1, j2, k], [low, high]) in self.jerk[rows.clone()].iter().zip(&mut self.on_jerk[rows]) {
                 let change = j0 * by[0] + j1 * by[1] + j2 * by[2];
-                let room = -0.5 * (r / at[0] + k * r) * by[0];
-                let [low, high] = &mut self.on_jerk[row];
-                update(low, c[0], room - change, after[0]);
-                update(high, c[1], room + change, after[1]);
+                let room = -0.5 * (r / b + k * r) * by[0];
+                follow(low, room - change);
+                follow(high, room + change);
             }
         }
+        (1.0 - TO_BOUNDARY) / fastest
     }
 }
 
-/// What is left of an acceleration limit on either side.
-fn sides([a0, a1]: &[f64; 2], b: f64, b1: f64) -> [f64; 2] {
-    let l = a0 * b + a1 * b1;
-    [1.0 - l, 1.0 + l]
+/// A constraint's slack at the current unknowns, and its multiplier.
+#[derive(Debug, Clone, Copy, Default)]
+struct Constraint {
+    slack: f64,
+    on: f64,
 }
 
-/// What is left of a jerk limit on either side, divided by sqrt(b).
-fn jerk_sides([j0, j1, j2, k]: &[f64; 4], [b, b1, b2]: [f64; 3]) -> [f64; 2] {
-    let root = b.max(0.0).sqrt();
-    let (l, room) = (j0 * b + j1 * b1 + j2 * b2, 1.0 / root - k * root);
-    [room - l, room + l]
+/// The barrier function's two parts.
+#[derive(Debug, Clone, Copy, Default)]
+struct Value {
+    time: f64,
+    logs: f64,
+}
+
+impl Value {
+    fn merit(self, mu: f64) -> f64 {
+        self.time - mu * self.logs
+    }
 }

@@ -3,15 +3,20 @@
 use super::Problem;
 
 /// Least and most cells, jumps apart.
-const CELLS: (f64, f64) = (48.0, 400.0);
+const CELLS: (f64, f64) = (48.0, 1000.0);
 /// Samples of how long a stretch takes, in each stretch between two breaks.
 const SAMPLES: usize = 4;
 /// How near a break its one-sided limit is taken, as a share of the stretch.
 const BESIDE: f64 = 1e-9;
 /// Neighbouring cells differ in length by about this much at most, as a share of the length.
 const GRADING: f64 = 0.5;
-/// What changes by less than this share of the largest value across a break does not jump there: second and third derivatives.
-const JUMP: [f64; 2] = [1e-6, 1e-2];
+/// An acceleration and a jerk that change by less than this share of their limit across a break do not jump there.
+const JUMP: [f64; 2] = [1e-6, 2e-2];
+/// A cell is halved where a row's acceleration or jerk, at a constant rate, differs in the middle from the ends' mean by more than this
+/// share of its limit.
+const UNEVEN: f64 = 0.01;
+/// Halvings at most.
+const DEEPEST: usize = 4;
 /// No cell between two jumps is shorter than this share of the usual: nearer breaks are left out unless they jump.
 const CLOSE: f64 = 0.3;
 
@@ -99,15 +104,53 @@ impl Grid {
         knots.push(end);
         knot_jumps.push(Vec::new());
         knot_slowness.push(*slowness.last()?);
-        let mut grid = Self { rates: Vec::new(), jumps: knot_jumps, slowness: knot_slowness, knots };
-        grid.rates.reserve(3 * problem.limits.len() * grid.cells());
-        for cell in 0..grid.cells() {
-            let (from, length) = (grid.knots[cell], grid.knots[cell + 1] - grid.knots[cell]);
-            for share in [BESIDE, 0.5, 1.0 - BESIDE] {
-                rates(from + share * length, &mut grid.rates);
+        let coarse = Self { rates: Vec::new(), jumps: knot_jumps, slowness: knot_slowness, knots };
+        let fine = coarse.halved(problem, rates);
+        fine.rates.iter().flatten().all(|rate| rate.is_finite()).then_some(fine)
+    }
+
+    /// With rates, and cells halved where the rows are too uneven for them.
+    fn halved(self, problem: &Problem<'_>, rates: &mut impl FnMut(f64, &mut Vec<[f64; 3]>)) -> Self {
+        let rows = problem.limits.len();
+        let mut fine = Self { knots: Vec::new(), rates: Vec::new(), jumps: Vec::new(), slowness: Vec::new() };
+        fine.rates.reserve(3 * rows * self.cells());
+        for (cell, jumps) in self.jumps.into_iter().enumerate() {
+            let (from, slowness) = (self.knots[cell], self.slowness[cell]);
+            fine.knots.push(from);
+            fine.jumps.push(jumps);
+            fine.slowness.push(slowness);
+            let Some(to) = self.knots.get(cell + 1).copied() else { break };
+            let least = 1.5 * (to - from) / f64::from(1u32 << DEEPEST);
+            let mut start = from;
+            let mut end = to;
+            loop {
+                let first = fine.rates.len();
+                for share in [BESIDE, 0.5, 1.0 - BESIDE] {
+                    rates(start + share * (end - start), &mut fine.rates);
+                }
+                let at = |point: usize, row: usize| fine.rates[first + point * rows + row];
+                let uneven = (0..rows).any(|row| {
+                    (1..3).any(|k| {
+                        let off = at(1, row)[k] - 0.5 * (at(0, row)[k] + at(2, row)[k]);
+                        off.abs() > UNEVEN * problem.limits[row][k] * slowness.powi(k as i32 + 1)
+                    })
+                });
+                if uneven && end - start > least {
+                    fine.rates.truncate(first);
+                    end = 0.5 * (start + end);
+                    continue;
+                }
+                if end >= to {
+                    break;
+                }
+                fine.knots.push(end);
+                fine.jumps.push(Vec::new());
+                fine.slowness.push(slowness);
+                start = end;
+                end = to;
             }
         }
-        grid.rates.iter().flatten().all(|rate| rate.is_finite()).then_some(grid)
+        fine
     }
 
     /// Number of cells.
@@ -138,7 +181,6 @@ fn stretches(problem: &Problem<'_>, rates: &mut impl FnMut(f64, &mut Vec<[f64; 3
     let mut stretches: Vec<Stretch> = Vec::new();
     let mut found = Vec::new();
     let mut before: Vec<[f64; 3]> = Vec::new();
-    let mut largest = vec![[0.0f64; 3]; problem.limits.len()];
     let mut beside = Vec::new();
     let mut from = problem.breaks[0];
     for to in &problem.breaks[1..] {
@@ -151,9 +193,6 @@ fn stretches(problem: &Problem<'_>, rates: &mut impl FnMut(f64, &mut Vec<[f64; 3
             found.clear();
             rates(from + (i as f64 + 0.5) / SAMPLES as f64 * length, &mut found);
             *slowness = pointwise(&found, problem.limits);
-            for (most, rates) in largest.iter_mut().zip(&found) {
-                (0..3).for_each(|k| most[k] = most[k].max(rates[k].abs()));
-            }
         }
         found.clear();
         rates(from + BESIDE * length, &mut found);
@@ -163,12 +202,16 @@ fn stretches(problem: &Problem<'_>, rates: &mut impl FnMut(f64, &mut Vec<[f64; 3
         stretches.push(Stretch { from, to: *to, slowness, jumps: None });
         from = *to;
     }
-    for (stretch, (before, after)) in stretches.iter_mut().zip(&beside).skip(1) {
-        let jump = |k: usize, row: usize| after[row][k] - before[row][k];
-        let jumps = |k: usize, row: usize| jump(k, row).abs() > JUMP[k - 1] * largest[row][k];
-        if (0..largest.len()).any(|row| jumps(1, row) || jumps(2, row)) {
-            let second = (0..largest.len()).map(|row| if jumps(1, row) { jump(1, row).abs() } else { 0.0 });
-            stretch.jumps = Some(second.collect());
+    for i in 1..stretches.len() {
+        let slowness = stretches[i - 1].slowness[SAMPLES - 1].max(stretches[i].slowness[0]);
+        let (before, after) = &beside[i];
+        let jump = |k: usize, row: usize| (after[row][k] - before[row][k]).abs();
+        let jumps =
+            |k: usize, row: usize| jump(k, row) > JUMP[k - 1] * problem.limits[row][k] * slowness.powi(k as i32 + 1);
+        let rows = problem.limits.len();
+        if (0..rows).any(|row| jumps(1, row) || jumps(2, row)) {
+            let second = (0..rows).map(|row| if jumps(1, row) { jump(1, row) } else { 0.0 });
+            stretches[i].jumps = Some(second.collect());
         }
     }
     (!stretches.is_empty()).then_some(stretches)
