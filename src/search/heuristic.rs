@@ -3,7 +3,7 @@
 //! but for the eight directions; where it says that a position is shut off, no motion of the robot gets there.
 
 use super::lattice::Lattice;
-use crate::esdf;
+use crate::esdf::{self, Esdf};
 use crate::geom::Pose2;
 use crate::map::VoxelMap;
 use crate::robot::{Convex, RobotModel};
@@ -45,6 +45,14 @@ impl Core {
             }
         }
         best.unwrap_or(Self { offset: [0.0; 2], radius: 0.0, heights: [0.1, 0.1] })
+    }
+
+    /// Clearance with the centre at a position, m: a guess from the field at one height. The ball there that is as wide as the
+    /// disc does not rise above the robot's own shape, where its height allows.
+    pub fn guessed_clearance(&self, esdf: &Esdf, [x, y]: [f64; 2]) -> f64 {
+        let [low, high] = self.heights;
+        let z = (high - self.radius).clamp(low, 0.5 * (low + high));
+        esdf.distance([x, y, z]) - self.radius
     }
 
     /// Where the centre is in a pose.

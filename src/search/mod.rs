@@ -14,6 +14,7 @@ mod joints;
 mod lattice;
 mod obstacles;
 mod posture;
+mod queue;
 mod route;
 mod shortcut;
 
@@ -155,12 +156,9 @@ fn search_postures<const W: usize>(
     }
     let lattice = Lattice::new(map);
     let core = heuristic::Core::new(robot);
-    let core_clearances = heuristic::core_clearance(&lattice, map, &core);
-    let goal = query.goal;
-    let cost_to_go =
-        heuristic::CostToGo::new(&lattice, (core, &core_clearances), map.resolution, clearance, goal, query.goal_yaw);
     let slack = core.offset[0].hypot(core.offset[1]);
-    let mut guide = guide::Guide::new(&lattice, &core_clearances, clearance - slack);
+    let guess = |place| core.guessed_clearance(esdf, place);
+    let mut guide = guide::Guide::new(&lattice, guess, clearance - slack);
     for attempt in 0..guide::TRIES {
         let Some(route) = guide.route(query, options, attempt) else { break };
         let grain = if attempt == 0 { Grain::COARSE } else { Grain { drive: 0.1, turn: 0.15 } };
@@ -169,6 +167,10 @@ fn search_postures<const W: usize>(
             Err(place) => guide.avoid(place),
         }
     }
+    let core_clearances = heuristic::core_clearance(&lattice, map, &core);
+    let goal = query.goal;
+    let cost_to_go =
+        heuristic::CostToGo::new(&lattice, (core, &core_clearances), map.resolution, clearance, goal, query.goal_yaw);
     let mut expanded_before = 0;
     for strict in [false, true] {
         let astar = astar::AStar {
