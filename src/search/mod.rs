@@ -13,6 +13,7 @@ mod heuristic;
 mod joints;
 mod lattice;
 mod obstacles;
+mod placed;
 mod posture;
 mod queue;
 mod route;

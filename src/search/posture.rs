@@ -81,9 +81,11 @@ impl<const W: usize> Bits<W> {
 
     /// The first `count` postures.
     pub fn all(count: usize) -> Self {
-        let mut bits = Self::EMPTY;
-        (0..count).for_each(|p| bits.insert(p));
-        bits
+        Self(std::array::from_fn(|w| match count.saturating_sub(64 * w) {
+            0 => 0,
+            rest @ 1..64 => (1 << rest) - 1,
+            _ => u64::MAX,
+        }))
     }
 
     pub fn insert(&mut self, posture: usize) {
