@@ -127,6 +127,8 @@ pub(super) struct Collider<'a, const W: usize> {
     /// Order in which postures are looked at: coarse first.
     order: Vec<usize>,
     all: Bits<W>,
+    /// A point (base frame) inside a rigid shape and how deep it lies there, m: the deepest known.
+    deepest: Option<(Vector3<f64>, f64)>,
     /// Obstacles that a motion with its middle in a tile of the plane may come near, of the tiles that were asked for.
     tiles: RefCell<BTreeMap<[i32; 2], Vec<Aabb>>>,
 }
@@ -171,8 +173,26 @@ impl<'a, const W: usize> Collider<'a, W> {
             }
         }
         let all = Bits::all(grid.count());
+        let balls = rigid.iter().flat_map(|placed| &placed.balls);
+        let deepest = balls.filter_map(|ball| Some((ball.centres[0], ball.inner?))).max_by(|a, b| a.1.total_cmp(&b.1));
         let tiles = RefCell::default();
-        Self { robot, esdf, map, clearance, grid, neighbours, rigid, moving, ball, reach, heights, order, all, tiles }
+        Self {
+            robot,
+            esdf,
+            map,
+            clearance,
+            grid,
+            neighbours,
+            rigid,
+            moving,
+            ball,
+            reach,
+            heights,
+            order,
+            all,
+            deepest,
+            tiles,
+        }
     }
 
     /// All postures.
@@ -204,6 +224,28 @@ impl<'a, const W: usize> Collider<'a, W> {
             }
         }
         free
+    }
+
+    /// Where a straight drive is tightest for the deepest point of the rigid shapes, m of it; `None`: it does not get through.
+    pub fn tightest(&self, from: Pose2, to: Pose2) -> Option<f64> {
+        let length = from.distance(to);
+        let Some((centre, inner)) = self.deepest else { return Some(0.0) };
+        let base: Base = from.into();
+        let (mut along, mut tightest) = (0.0, (f64::INFINITY, 0.0));
+        while along <= length {
+            let share = along / length.max(1e-9);
+            let at = base.moved_to(from.x + share * (to.x - from.x), from.y + share * (to.y - from.y));
+            let room = self.esdf.distance(at.map(&centre)) + TOO_LOW * self.map.resolution - inner - self.clearance;
+            if room < 0.0 {
+                return None;
+            }
+            if room < tightest.0 {
+                tightest = (room, along);
+            }
+            // Room is not lost faster than it is driven through.
+            along += room.max(self.map.resolution);
+        }
+        Some(tightest.1)
     }
 
     /// Those of `alive` in which one moving shape is clear.

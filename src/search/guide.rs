@@ -19,6 +19,8 @@ const ROOM: f64 = 0.5;
 const TIGHT: [u32; 3] = [10, 30, 80];
 /// Corners are kept where the way bends by more than this, m: coarse on the first try, fine later.
 const BEND: [f64; 2] = [0.04, 0.02];
+/// Tenths that the estimate weighs: ways are at most that much dearer than the cheapest.
+const WEIGHT: u32 = 11;
 /// What a place that blocked a route costs more, and how far about it (m).
 const BLOCKED: (u16, f64) = (6, 0.2);
 
@@ -27,36 +29,38 @@ const UNKNOWN: u8 = 0;
 const CLOSED: u8 = 1;
 const ROOMY: u8 = 2;
 const TIGHTEST: u8 = 255;
+/// In place of a step: reached, and its cost final.
+const DONE: u8 = 0x80;
+
+/// What is known of a position. All zero: nothing.
+#[derive(Clone, Copy, Default)]
+struct Place {
+    /// Cost to it plus one; zero where it was not reached.
+    best: u32,
+    /// What blocked places cost more, less one.
+    extra: u16,
+    tight: u8,
+    /// Number of the step that led here, and [`DONE`].
+    came: u8,
+}
 
 /// `clearance` is that of the base's core at a position, m; it is asked only where a way may come by.
-pub(super) struct Guide<'a, C: Fn([f64; 2]) -> f64> {
-    lattice: &'a Lattice,
+pub(super) struct Guide<C: Fn([f64; 2]) -> f64> {
+    lattice: Lattice,
     clearance: C,
     /// Where the clearance is below this nothing passes, m.
     least: f64,
-    tight: Vec<u8>,
-    /// What blocked places cost more, less one.
-    extra: Vec<u16>,
-    /// Cost to each position, plus one; zero where it was not reached; and the step by which it was.
-    best: Vec<u32>,
-    came: Vec<u8>,
+    places: Vec<Place>,
+    /// Those that were reached on this try.
+    reached: Vec<u32>,
     open: RadixHeap,
 }
 
-impl<'a, C: Fn([f64; 2]) -> f64> Guide<'a, C> {
-    pub fn new(lattice: &'a Lattice, clearance: C, least: f64) -> Self {
+impl<C: Fn([f64; 2]) -> f64> Guide<C> {
+    pub fn new(lattice: Lattice, clearance: C, least: f64) -> Self {
         // All zero, so memory that no way comes by is never touched.
-        let positions = lattice.size[0] as usize * lattice.size[1] as usize;
-        Self {
-            lattice,
-            clearance,
-            least,
-            tight: vec![UNKNOWN; positions],
-            extra: vec![0; positions],
-            best: Vec::new(),
-            came: vec![0; positions],
-            open: RadixHeap::new(),
-        }
+        let places = vec![Place::default(); lattice.size[0] as usize * lattice.size[1] as usize];
+        Self { lattice, clearance, least, places, reached: Vec::new(), open: RadixHeap::new() }
     }
 
     /// The route along the cheapest way. `None`: there is none in the plane.
@@ -91,7 +95,7 @@ impl<'a, C: Fn([f64; 2]) -> f64> Guide<'a, C> {
             for j in range(1) {
                 let near = (f64::from(i) - at[0]).hypot(f64::from(j) - at[1]) <= reach;
                 if near && self.lattice.contains(i, j) {
-                    let own = &mut self.extra[self.lattice.index(i, j)];
+                    let own = &mut self.places[self.lattice.index(i, j)].extra;
                     *own = ((*own + 1) * factor).min(1_000) - 1;
                 }
             }
@@ -99,74 +103,90 @@ impl<'a, C: Fn([f64; 2]) -> f64> Guide<'a, C> {
     }
 
     /// How tight a position is; `CLOSED`: not passable.
-    fn tight(&mut self, index: usize, (i, j): (i32, i32)) -> u8 {
-        if self.tight[index] == UNKNOWN {
-            let room = (self.clearance)(self.lattice.position(i, j)) - self.least;
-            let tight = ((ROOM - room) / ROOM).clamp(0.0, 1.0);
-            let span = f64::from(TIGHTEST - ROOMY);
-            self.tight[index] = if room >= 0.0 { ROOMY + (span * tight * tight) as u8 } else { CLOSED };
-        }
-        self.tight[index]
+    fn tight(&self, i: i32, j: i32) -> u8 {
+        let room = (self.clearance)(self.lattice.position(i, j)) - self.least;
+        let tight = ((ROOM - room) / ROOM).clamp(0.0, 1.0);
+        let span = f64::from(TIGHTEST - ROOMY);
+        if room >= 0.0 { ROOMY + (span * tight * tight) as u8 } else { CLOSED }
     }
 
     /// Positions of the cheapest way between the lattice positions nearest to two points (A*; the estimate is that of an
-    /// empty plane).
+    /// empty plane, weighed).
     fn way(&mut self, [from, to]: [[f64; 2]; 2], touching: u32) -> Option<Vec<[f64; 2]>> {
-        let lattice = self.lattice;
         let nearest = |p: [f64; 2]| {
-            let [i, j] = lattice.coordinates(p[0], p[1]).map(|v| v.round() as i32);
-            lattice.contains(i, j).then_some((i, j))
+            let [i, j] = self.lattice.coordinates(p[0], p[1]).map(|v| v.round() as i32);
+            self.lattice.contains(i, j).then_some((i, j))
         };
         let (from, to) = (nearest(from)?, nearest(to)?);
         let to_go = |(i, j): (i32, i32)| {
             let (di, dj) = ((i - to.0).unsigned_abs(), (j - to.1).unsigned_abs());
-            10 * di.max(dj) + 4 * di.min(dj)
+            (10 * di.max(dj) + 4 * di.min(dj)) * WEIGHT / 10
         };
-        let row = lattice.size[1];
-        let (first, goal) = (lattice.index(from.0, from.1), lattice.index(to.0, to.1));
-        self.best = vec![0; self.tight.len()];
+        let row = self.lattice.size[1];
+        let (first, goal) = (self.lattice.index(from.0, from.1), self.lattice.index(to.0, to.1));
+        for index in self.reached.drain(..) {
+            let place = &mut self.places[index as usize];
+            (place.best, place.came) = (0, 0);
+        }
         self.open.clear();
-        self.best[first] = 1;
+        self.places[first].best = 1;
+        self.reached.push(first as u32);
         self.open.push(to_go(from), first as u32);
         while let Some((estimate, index)) = self.open.pop() {
-            let index = index as usize;
-            if index == goal {
+            let here = &mut self.places[index as usize];
+            if here.came & DONE != 0 {
+                continue;
+            }
+            here.came |= DONE;
+            let own = here.best;
+            if index as usize == goal {
                 break;
             }
             let at = (index as i32 / row, index as i32 % row);
-            let own = self.best[index] - 1;
-            if estimate > own + to_go(at) {
-                continue;
-            }
             for (k, (di, dj, length)) in NEIGHBOURS.iter().enumerate() {
                 let next = (at.0 + di, at.1 + dj);
-                if !lattice.contains(next.0, next.1) {
+                if !self.lattice.contains(next.0, next.1) {
                     continue;
                 }
-                let there = lattice.index(next.0, next.1);
-                let tight = self.tight(there, next);
-                // The goal itself was found free; how its surroundings look is only a guess.
-                if tight == CLOSED && there != goal {
+                let there = self.lattice.index(next.0, next.1);
+                let place = self.places[there];
+                // Most were reached no dearer, however roomy they are.
+                if place.came & DONE != 0 || place.tight == CLOSED || place.best != 0 && place.best <= own + length {
                     continue;
                 }
-                let tight = u32::from(tight.max(ROOMY) - ROOMY);
-                let dear = 10 + touching * tight / u32::from(TIGHTEST - ROOMY);
-                let cost = own + dear * (1 + u32::from(self.extra[there])) * length / 10;
-                if self.best[there] == 0 || cost < self.best[there] - 1 {
-                    self.best[there] = cost + 1;
-                    self.came[there] = k as u8;
-                    self.open.push(cost + to_go(next), there as u32);
+                let mut tight = place.tight;
+                if tight == UNKNOWN {
+                    tight = self.tight(next.0, next.1);
+                    // The goal itself was found free; how its surroundings look is only a guess.
+                    if tight == CLOSED && there == goal {
+                        tight = TIGHTEST;
+                    }
+                    self.places[there].tight = tight;
+                    if tight == CLOSED {
+                        continue;
+                    }
+                }
+                let dear = 10 + touching * u32::from(tight - ROOMY) / u32::from(TIGHTEST - ROOMY);
+                let cost = own + dear * (1 + u32::from(place.extra)) * length / 10;
+                if place.best == 0 || cost < place.best {
+                    if place.best == 0 {
+                        self.reached.push(there as u32);
+                    }
+                    let place = &mut self.places[there];
+                    (place.best, place.came) = (cost, k as u8);
+                    // A weighed estimate may fall: the queue wants one that does not.
+                    self.open.push(estimate.max(cost + to_go(next)), there as u32);
                 }
             }
         }
-        if self.best[goal] == 0 {
+        if self.places[goal].best == 0 {
             return None;
         }
         let mut at = to;
         let mut way = Vec::new();
         while at != from {
-            way.push(lattice.position(at.0, at.1));
-            let (di, dj, _) = NEIGHBOURS[usize::from(self.came[lattice.index(at.0, at.1)])];
+            way.push(self.lattice.position(at.0, at.1));
+            let (di, dj, _) = NEIGHBOURS[usize::from(self.places[self.lattice.index(at.0, at.1)].came & !DONE)];
             at = (at.0 - di, at.1 - dj);
         }
         // The ends are not the exact start and goal: the first and last steps would only wiggle.
@@ -209,7 +229,7 @@ mod tests {
         let lattice = Lattice::new(&VoxelMap::new(0.05, [0.0; 3], [60, 40, 1], Unknown::Occupied));
         let edge = |v: f64, length: f64| v.min(length - v);
         let clearance = |[x, y]: [f64; 2]| edge(x, 3.0).min(edge(y, 2.0));
-        let mut guide = Guide::new(&lattice, clearance, 0.02);
+        let mut guide = Guide::new(lattice.clone(), clearance, 0.02);
         let middle = guide.way([[0.3, 1.0], [2.7, 1.0]], 80).expect("free");
         assert!(middle.iter().all(|p| (p[1] - 1.0).abs() < 0.06), "{middle:?}");
         guide.avoid([1.5, 1.0]);

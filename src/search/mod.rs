@@ -145,7 +145,7 @@ fn search_postures<const W: usize>(
 
     let finish = |route: &route::Route, grain, collider: &Collider<'_, W>, expanded| {
         let open_end = query.goal_yaw.is_none();
-        let shortcutter = Shortcutter { collider, start_postures, goal_postures, open_end, grain };
+        let shortcutter = Shortcutter::new(collider, [start_postures, goal_postures], open_end, grain);
         let checked = shortcutter.shorten(shortcutter.check(route.clone())?);
         let pieces = checked.route.pieces(grain);
         Ok(with_joints(collider, robot, query, &checked, &pieces, [start_postures, goal_postures], expanded))
@@ -159,7 +159,7 @@ fn search_postures<const W: usize>(
     let core = heuristic::Core::new(robot);
     let slack = core.offset[0].hypot(core.offset[1]);
     let guess = |place| core.guessed_clearance(esdf, place);
-    let mut guide = guide::Guide::new(&lattice, guess, clearance - slack);
+    let mut guide = guide::Guide::new(lattice.clone(), guess, clearance - slack);
     for attempt in 0..guide::TRIES {
         let Some(route) = guide.route(query, options, attempt) else { break };
         let grain = if attempt == 0 { Grain::COARSE } else { Grain { drive: 0.1, turn: 0.15 } };

@@ -60,7 +60,9 @@ impl Posed {
     /// Bounds of a shape.
     pub fn bounds(&self, convex: &Convex) -> Aabb {
         let reach: [f64; 3] = match convex {
-            Convex::Box { half } => std::array::from_fn(|a| (0..3).map(|k| self.rotation[(a, k)].abs() * half[k]).sum()),
+            Convex::Box { half } => {
+                std::array::from_fn(|a| (0..3).map(|k| self.rotation[(a, k)].abs() * half[k]).sum())
+            }
             Convex::Sphere { radius } => [*radius; 3],
             _ => {
                 let end = |a: usize, sign: f64| self.support(convex, &Vector3::ith(a, sign))[a];
@@ -83,7 +85,8 @@ impl Posed {
             Convex::Hull { vertices } => of(&mut vertices.iter().map(|v| Vector3::from(*v))),
             Convex::Sphere { radius } => flat(self.centre) + radius,
             Convex::Cylinder { radius, half_length } => {
-                let ends = [-1.0, 1.0].map(|s| flat(self.centre + self.rotation * Vector3::new(0.0, 0.0, s * half_length)));
+                let ends =
+                    [-1.0, 1.0].map(|s| flat(self.centre + self.rotation * Vector3::new(0.0, 0.0, s * half_length)));
                 of(&mut corners(convex.half_extents())).min(ends[0].max(ends[1]) + radius)
             }
             Convex::Box { half } => of(&mut corners(*half)),

@@ -1,5 +1,8 @@
 //! Fewer corners: straight drives that skip corners of a route, where the postures still get through.
 
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
 use super::astar::TURN_COST;
 use super::collide::{BaseMotion, Collider};
 use super::posture::Bits;
@@ -22,7 +25,14 @@ pub(super) struct Shortcutter<'a, const W: usize> {
     /// Whether the last turn may change: the goal leaves the heading open.
     pub open_end: bool,
     pub grain: Grain,
+    /// Free postures of the drives that were asked for.
+    drives: RefCell<BTreeMap<DriveKey, Masks<W>>>,
 }
+
+/// Ends of a drive, and the heading's sense, bit by bit.
+type DriveKey = ([u64; 4], bool);
+/// Free postures of pieces in order; `None`: one is blocked.
+type Masks<const W: usize> = Option<Vec<Bits<W>>>;
 
 impl<const W: usize> CheckedRoute<W> {
     /// Free postures of all pieces, in the order of [`Route::pieces`].
@@ -38,7 +48,12 @@ impl<const W: usize> CheckedRoute<W> {
     }
 }
 
-impl<const W: usize> Shortcutter<'_, W> {
+impl<'a, const W: usize> Shortcutter<'a, W> {
+    pub fn new(collider: &'a Collider<'a, W>, ends: [Bits<W>; 2], open_end: bool, grain: Grain) -> Self {
+        let [start_postures, goal_postures] = ends;
+        Self { collider, start_postures, goal_postures, open_end, grain, drives: RefCell::default() }
+    }
+
     /// Checks all pieces of a route.
     ///
     /// # Errors
@@ -75,7 +90,7 @@ impl<const W: usize> Shortcutter<'_, W> {
     }
 
     /// Free postures of the pieces of a corner's turn; those of the first corner begin with standing still.
-    fn turn(&self, corner: usize, at: [f64; 2], yaw: f64, turn: f64) -> Option<Vec<Bits<W>>> {
+    fn turn(&self, corner: usize, at: [f64; 2], yaw: f64, turn: f64) -> Masks<W> {
         let mut pieces = Vec::new();
         if corner == 0 {
             let pose = Pose2::new(at[0], at[1], yaw);
@@ -85,13 +100,28 @@ impl<const W: usize> Shortcutter<'_, W> {
         self.masks_of(&pieces)
     }
 
-    fn drive(&self, from: [f64; 2], to: [f64; 2], yaw: f64) -> Option<Vec<Bits<W>>> {
-        let mut pieces = Vec::new();
-        drive_pieces(Pose2::new(from[0], from[1], yaw), Pose2::new(to[0], to[1], yaw), self.grain, &mut pieces);
-        self.masks_of(&pieces)
+    fn drive(&self, from: [f64; 2], to: [f64; 2], yaw: f64, reverse: bool) -> Masks<W> {
+        let key = ([from[0], from[1], to[0], to[1]].map(f64::to_bits), reverse);
+        self.drives.borrow_mut().entry(key).or_insert_with(|| self.find_drive(from, to, yaw)).clone()
     }
 
-    fn masks_of(&self, pieces: &[BaseMotion]) -> Option<Vec<Bits<W>>> {
+    fn find_drive(&self, from: [f64; 2], to: [f64; 2], yaw: f64) -> Masks<W> {
+        let [from, to] = [from, to].map(|[x, y]| Pose2::new(x, y, yaw));
+        let tightest = self.collider.tightest(from, to)?;
+        let mut pieces = Vec::new();
+        drive_pieces(from, to, self.grain, &mut pieces);
+        // What blocks a drive most often is where it is tightest.
+        let worst = (tightest / from.distance(to) * pieces.len() as f64) as usize;
+        let worst = worst.min(pieces.len().checked_sub(1)?);
+        let there = self.collider.free(&pieces[worst]);
+        if there.is_empty() {
+            return None;
+        }
+        let free = |(k, piece)| if k == worst { there } else { self.collider.free(piece) };
+        pieces.iter().enumerate().map(|piece| Some(free(piece)).filter(|m| !m.is_empty())).collect()
+    }
+
+    fn masks_of(&self, pieces: &[BaseMotion]) -> Masks<W> {
         pieces.iter().map(|p| Some(self.collider.free(p)).filter(|m| !m.is_empty())).collect()
     }
 
@@ -180,8 +210,8 @@ impl<const W: usize> Shortcutter<'_, W> {
         if length + TURN_COST * (turn_a.abs() + turn_b.abs()) >= old - 1e-9 {
             return None;
         }
+        let drive = self.drive(from, to, headings[a] + turn_a, route.reverse[a])?;
         let first = self.turn(a, from, headings[a], turn_a)?;
-        let drive = self.drive(from, to, headings[a] + turn_a)?;
         let second = self.turn(b, to, headings[a] + turn_a, turn_b)?;
         let set = self.flow(self.flow(self.flow(forward[a], &first), &drive), &second);
         if set.and(backward[b]).is_empty() {
