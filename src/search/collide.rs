@@ -121,7 +121,7 @@ pub(super) struct Collider<'a, const W: usize> {
     /// Height of the centre, and radius, of a ball about the base's axis that holds the robot in every posture.
     ball: (f64, f64),
     /// Largest horizontal distance of any point of the robot from the base's axis, over all postures, m.
-    reach: f64,
+    pub reach: f64,
     /// z range of the robot over all postures.
     heights: [f64; 2],
     /// Order in which postures are looked at: coarse first.

@@ -45,8 +45,8 @@ struct Place {
 }
 
 /// `clearance` is that of the base's core at a position, m; it is asked only where a way may come by.
-pub(super) struct Guide<C: Fn([f64; 2]) -> f64> {
-    lattice: Lattice,
+pub(super) struct Guide<'a, C: Fn([f64; 2]) -> f64> {
+    lattice: &'a Lattice,
     clearance: C,
     /// Where the clearance is below this nothing passes, m.
     least: f64,
@@ -56,8 +56,8 @@ pub(super) struct Guide<C: Fn([f64; 2]) -> f64> {
     open: RadixHeap,
 }
 
-impl<C: Fn([f64; 2]) -> f64> Guide<C> {
-    pub fn new(lattice: Lattice, clearance: C, least: f64) -> Self {
+impl<'a, C: Fn([f64; 2]) -> f64> Guide<'a, C> {
+    pub fn new(lattice: &'a Lattice, clearance: C, least: f64) -> Self {
         // All zero, so memory that no way comes by is never touched.
         let places = vec![Place::default(); lattice.size[0] as usize * lattice.size[1] as usize];
         Self { lattice, clearance, least, places, reached: Vec::new(), open: RadixHeap::new() }
@@ -229,7 +229,7 @@ mod tests {
         let lattice = Lattice::new(&VoxelMap::new(0.05, [0.0; 3], [60, 40, 1], Unknown::Occupied));
         let edge = |v: f64, length: f64| v.min(length - v);
         let clearance = |[x, y]: [f64; 2]| edge(x, 3.0).min(edge(y, 2.0));
-        let mut guide = Guide::new(lattice.clone(), clearance, 0.02);
+        let mut guide = Guide::new(&lattice, clearance, 0.02);
         let middle = guide.way([[0.3, 1.0], [2.7, 1.0]], 80).expect("free");
         assert!(middle.iter().all(|p| (p[1] - 1.0).abs() < 0.06), "{middle:?}");
         guide.avoid([1.5, 1.0]);

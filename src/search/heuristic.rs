@@ -108,7 +108,7 @@ pub(super) const NEIGHBOURS: [(i32, i32, u32); 8] =
     [(1, 0, 10), (0, 1, 10), (-1, 0, 10), (0, -1, 10), (1, 1, 14), (1, -1, 14), (-1, 1, 14), (-1, -1, 14)];
 
 /// Least clearance of the core, as interpolated at a lattice position, with which its centre may pass within 0.71 steps.
-fn least_clearance(lattice: &Lattice, resolution: f64, clearance: f64) -> f32 {
+pub(super) fn least_clearance(lattice: &Lattice, resolution: f64, clearance: f64) -> f32 {
     let on_nodes = (lattice.step / resolution + 1e-6).fract() < 2e-6;
     let slack = 0.71 * lattice.step + if on_nodes { 0.0 } else { 0.87 * resolution };
     (clearance - slack) as f32 - 1e-5

@@ -153,9 +153,11 @@ fn corners(half: [f64; 3]) -> impl Iterator<Item = Vector3<f64>> {
     (0..8).map(move |k| Vector3::from_fn(|a, _| if k >> a & 1 == 0 { -half[a] } else { half[a] }))
 }
 
-/// Balls that cover a box: as many along each axis as make them about as wide as the box's least side. With each ball's
-/// centre, how deep that is known to be inside the shape.
-fn cover(convex: &Convex, half: [f64; 3], bounding: f64) -> (Vec<(Vector3<f64>, Option<f64>)>, f64) {
+/// A ball's centre in the shape's frame, and how deep that is known to be inside the shape, m.
+type Covering = (Vector3<f64>, Option<f64>);
+
+/// Balls that cover a box: as many along each axis as make them about as wide as the box's least side; and their radius, m.
+fn cover(convex: &Convex, half: [f64; 3], bounding: f64) -> (Vec<Covering>, f64) {
     let least = half.iter().copied().fold(f64::INFINITY, f64::min).max(0.03);
     let counts = half.map(|h| ((h / least / 1.5).ceil() as usize).clamp(1, 6));
     let part: [f64; 3] = std::array::from_fn(|a| half[a] / counts[a] as f64);

@@ -65,6 +65,18 @@ impl PostureGrid {
         self.values.iter().zip(&self.strides).map(|(v, s)| (v.len(), *s))
     }
 
+    /// Postures with one of these joints at an end of its range.
+    pub fn brinks<const W: usize>(&self, joints: impl Iterator<Item = usize>) -> Bits<W> {
+        let mut out = Bits::EMPTY;
+        for joint in joints {
+            let (count, stride) = (self.values[joint].len(), self.strides[joint]);
+            let at_end = |p: &usize| [0, count - 1].contains(&(p / stride % count));
+            // A joint with one value has nowhere to go.
+            (0..self.count).filter(|p| count > 1 && at_end(p)).for_each(|p| out.insert(p));
+        }
+        out
+    }
+
     /// Distance between neighbouring values of a joint.
     pub fn step(&self, joint: usize) -> f64 {
         let v = &self.values[joint];
