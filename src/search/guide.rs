@@ -11,8 +11,9 @@ use super::queue::RadixHeap;
 use super::route::Route;
 use super::{Query, SearchOptions};
 
-/// Routes that are tried.
-pub(super) const TRIES: usize = 6;
+/// Routes that are tried at least, and one more for so many metres from start to goal: a long way has more places to be blocked.
+const TRIES: usize = 6;
+const METRES_A_TRY: f64 = 3.0;
 /// Clearance of the base's core beyond which more is no better, m.
 const ROOM: f64 = 0.5;
 /// What touching costs over having that room, in tenths of a straight step, try by try: first the short way, then the middle.
@@ -23,6 +24,11 @@ const BEND: [f64; 2] = [0.04, 0.02];
 const WEIGHT: u32 = 11;
 /// What a place that blocked a route costs more, and how far about it (m).
 const BLOCKED: (u16, f64) = (6, 0.2);
+
+/// Routes that are worth a try.
+pub(super) fn tries(query: &Query) -> usize {
+    TRIES + (query.start.distance(query.goal) / METRES_A_TRY) as usize
+}
 
 /// How tight a position is: not known yet, or not passable, or else more than these, up to `TIGHTEST`.
 const UNKNOWN: u8 = 0;

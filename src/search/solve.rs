@@ -84,7 +84,7 @@ impl<'a, const W: usize> Solver<'a, W> {
         let [x, y] = self.core.offset;
         let guess = |place| self.core.guessed_clearance(esdf, place);
         let mut guide = Guide::new(&self.lattice, guess, options.clearance - x.hypot(y));
-        for attempt in 0..guide::TRIES {
+        for attempt in 0..guide::tries(query) {
             let route = guide.route(query, options, attempt)?;
             let grain = if attempt == 0 { Grain::COARSE } else { Grain { drive: 0.1, turn: 0.15 } };
             match self.finish(&route, grain, &self.collider, 0) {
