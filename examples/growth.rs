@@ -130,7 +130,7 @@ fn main() {
     println!("| side m | boxes/m² | joints | million voxels | map ms / MiB | field ms / MiB | search ms / MiB | way |");
     println!("|---|---|---|---|---|---|---|---|");
     let sides = [10, 20, 40, 70, 100].map(|side| [f64::from(side), 0.2, 1.0]);
-    let densities = [0.2, 0.6, 2.0].map(|density| [40.0, density, 1.0]);
+    let densities = [0.2, 0.6, 2.0].map(|density| [20.0, density, 1.0]);
     let arms = [0, 1, 2, 3, 4].map(|arms| [20.0, 0.2, f64::from(arms)]);
     let own = std::env::current_exe().expect("this program's own path");
     for case in sides.iter().chain(&densities).chain(&arms) {

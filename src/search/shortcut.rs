@@ -57,47 +57,50 @@ impl<'a, const W: usize> Shortcutter<'a, W> {
     /// Checks all pieces of a route.
     ///
     /// # Errors
-    /// About where it is blocked, or the postures do not get through.
-    pub fn check(&self, route: Route) -> Result<CheckedRoute<W>, [f64; 2]> {
+    /// About where it is blocked, or the postures do not get through: all such places, each as if the ones before were free.
+    pub fn check(&self, route: Route) -> Result<CheckedRoute<W>, Vec<[f64; 2]>> {
         let headings = headings_at_corners(&route);
         let mut checked = CheckedRoute { turns: Vec::new(), drives: Vec::new(), route };
+        let mut blocked = Vec::new();
         let mut set = self.start_postures;
+        let mut pass = |mask: Bits<W>, place: [f64; 2]| {
+            set = self.collider.neighbours.flood(set, mask);
+            if set.is_empty() {
+                blocked.push(place);
+                set = self.collider.all();
+            }
+            mask
+        };
         for (k, heading) in headings.iter().enumerate() {
             let (at, turn) = (checked.route.corners[k], checked.route.turns[k]);
-            let turned = self.turn(k, at, *heading, turn).ok_or(at)?;
-            set = self.flow(set, &turned);
-            if set.is_empty() {
-                return Err(at);
-            }
-            checked.turns.push(turned);
+            let pieces = self.turn_pieces(k, at, *heading, turn);
+            checked.turns.push(pieces.iter().map(|piece| pass(self.collider.free(piece), at)).collect());
             let Some(next) = checked.route.corners.get(k + 1).copied() else { continue };
             let mut pieces = Vec::new();
             let yaw = heading + turn;
             drive_pieces(Pose2::new(at[0], at[1], yaw), Pose2::new(next[0], next[1], yaw), self.grain, &mut pieces);
-            let mut driven = Vec::with_capacity(pieces.len());
-            for piece in &pieces {
-                let mask = self.collider.free(piece);
-                set = self.collider.neighbours.flood(set, mask);
-                if set.is_empty() {
-                    return Err([0.5 * (piece.from.x + piece.to.x), 0.5 * (piece.from.y + piece.to.y)]);
-                }
-                driven.push(mask);
-            }
-            checked.drives.push(driven);
+            let middle = |piece: &BaseMotion| [0.5 * (piece.from.x + piece.to.x), 0.5 * (piece.from.y + piece.to.y)];
+            checked.drives.push(pieces.iter().map(|piece| pass(self.collider.free(piece), middle(piece))).collect());
         }
         let end = checked.route.corners[checked.route.corners.len() - 1];
-        if set.and(self.goal_postures).is_empty() { Err(end) } else { Ok(checked) }
+        pass(self.goal_postures, end);
+        if blocked.is_empty() { Ok(checked) } else { Err(blocked) }
     }
 
     /// Free postures of the pieces of a corner's turn; those of the first corner begin with standing still.
     fn turn(&self, corner: usize, at: [f64; 2], yaw: f64, turn: f64) -> Masks<W> {
+        let pieces = self.turn_pieces(corner, at, yaw, turn);
+        pieces.iter().map(|p| Some(self.collider.free(p)).filter(|m| !m.is_empty())).collect()
+    }
+
+    fn turn_pieces(&self, corner: usize, at: [f64; 2], yaw: f64, turn: f64) -> Vec<BaseMotion> {
         let mut pieces = Vec::new();
         if corner == 0 {
             let pose = Pose2::new(at[0], at[1], yaw);
             pieces.push(BaseMotion { from: pose, to: pose });
         }
         spin_pieces(Pose2::new(at[0], at[1], yaw), turn, self.grain, &mut pieces);
-        self.masks_of(&pieces)
+        pieces
     }
 
     fn drive(&self, from: [f64; 2], to: [f64; 2], yaw: f64, reverse: bool) -> Masks<W> {
@@ -119,10 +122,6 @@ impl<'a, const W: usize> Shortcutter<'a, W> {
         }
         let free = |(k, piece)| if k == worst { there } else { self.collider.free(piece) };
         pieces.iter().enumerate().map(|piece| Some(free(piece)).filter(|m| !m.is_empty())).collect()
-    }
-
-    fn masks_of(&self, pieces: &[BaseMotion]) -> Masks<W> {
-        pieces.iter().map(|p| Some(self.collider.free(p)).filter(|m| !m.is_empty())).collect()
     }
 
     fn flow(&self, set: Bits<W>, masks: &[Bits<W>]) -> Bits<W> {

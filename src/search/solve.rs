@@ -89,7 +89,7 @@ impl<'a, const W: usize> Solver<'a, W> {
             let grain = if attempt == 0 { Grain::COARSE } else { Grain { drive: 0.1, turn: 0.15 } };
             match self.finish(&route, grain, &self.collider, 0) {
                 Ok(path) => return Some(path),
-                Err(place) => guide.avoid(place),
+                Err(places) => places.into_iter().for_each(|place| guide.avoid(place)),
             }
         }
         None
@@ -145,14 +145,14 @@ impl<'a, const W: usize> Solver<'a, W> {
     /// The route checked, shortened and with its joints.
     ///
     /// # Errors
-    /// About where it is blocked.
+    /// About where it is blocked, all along.
     fn finish(
         &self,
         route: &Route,
         grain: Grain,
         collider: &Collider<'_, W>,
         expanded: usize,
-    ) -> Result<SearchPath, [f64; 2]> {
+    ) -> Result<SearchPath, Vec<[f64; 2]>> {
         let open_end = self.problem.query.goal_yaw.is_none();
         let ends = [self.start_postures, self.goal_postures];
         let shortcutter = Shortcutter::new(collider, ends, open_end, grain);
