@@ -364,10 +364,8 @@ fn query(mission: &Mission, robot: &RobotModel) -> Query {
 /// Points a search error at the pose it is about.
 fn place_search_error(mission: &Mission, error: &SearchError) -> Diagnostics {
     use crate::diag::Describe;
-    let span = match error {
-        SearchError::StartBlocked { .. } | SearchError::OffMap { which: "start", .. } => mission.spans.start.as_ref(),
-        _ => mission.spans.goal.as_ref(),
-    };
+    let spans = &mission.spans;
+    let span = if error.is_about_start() { spans.start.as_ref() } else { spans.goal.as_ref() };
     error.diagnostic().maybe_at(span).into()
 }
 

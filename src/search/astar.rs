@@ -22,7 +22,7 @@ pub(super) const TURN_COST: f64 = 0.3;
 /// What backing up costs over driving forward.
 const REVERSE_COST: f64 = 1.5;
 /// Labels after which the search gives up, so that memory stays bounded.
-const MOST_LABELS: usize = 20_000_000;
+pub(super) const MOST_LABELS: usize = 20_000_000;
 
 /// What the search found.
 pub(super) enum Outcome {
@@ -35,7 +35,7 @@ pub(super) enum Outcome {
         closest: Pose2,
         expanded: usize,
     },
-    /// [`MOST_LABELS`] were made.
+    /// As many were made as may be.
     Limit {
         labels: usize,
     },
@@ -122,6 +122,8 @@ pub(super) struct AStar<'a, const W: usize> {
     pub strict: bool,
     pub query: &'a Query,
     pub options: &'a SearchOptions,
+    /// Labels after which it gives up.
+    pub most_labels: usize,
     pub start_postures: Bits<W>,
     pub goal_postures: Bits<W>,
 }
@@ -198,7 +200,7 @@ impl<const W: usize> AStar<'_, W> {
                 self.try_goal(&mut run, label);
             }
             self.expand(&mut run, label, fresh);
-            if run.labels.len() > MOST_LABELS {
+            if run.labels.len() > self.most_labels {
                 return Outcome::Limit { labels: run.labels.len() };
             }
         }

@@ -1,16 +1,20 @@
 //! Which postures are free along a motion of the base: exact, from the occupied cells' cubes; the distance field only says
 //! early that everything near is free, or that something is not.
 
+use std::cell::{Cell, OnceCell, RefCell};
+use std::collections::BTreeMap;
+
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::obstacles;
+use super::placed::{Base, Placed, Posed};
 use super::posture::{Bits, Neighbours, PostureGrid};
 use crate::esdf::Esdf;
 use crate::geom::{Aabb, Pose2};
 use crate::map::VoxelMap;
 use crate::math::gjk;
 use crate::mission::Unknown;
-use crate::robot::{Convex, RobotModel};
+use crate::robot::RobotModel;
 
 /// A motion of the base: a straight drive (equal headings) or a spin (equal positions) of at most a right angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,10 +29,26 @@ impl BaseMotion {
         Pose2::new(mean(self.from.x, self.to.x), mean(self.from.y, self.to.y), mean(self.from.yaw, self.to.yaw))
     }
 
-    fn turn(&self) -> f64 {
-        (self.to.yaw - self.from.yaw).abs()
+    /// The poses at the middles of equal parts.
+    fn parts(&self) -> [Base; PARTS] {
+        let middle: Base = self.middle().into();
+        std::array::from_fn(|k| {
+            let share = (k as f64 + 0.5) / PARTS as f64;
+            let mix = |a: f64, b: f64| a + share * (b - a);
+            let [a, b] = [&self.from, &self.to];
+            if a.yaw == b.yaw {
+                return middle.moved_to(mix(a.x, b.x), mix(a.y, b.y));
+            }
+            Pose2::new(mix(a.x, b.x), mix(a.y, b.y), mix(a.yaw, b.yaw)).into()
+        })
     }
 }
+
+/// Parts of a motion that are looked at in the distance field, where one look at its middle says too little.
+const PARTS: usize = 4;
+/// Side of the tiles whose obstacles are collected once, m; longest half of a motion that they are enough for.
+const TILE: f64 = 0.4;
+const TILE_MARGIN: f64 = 0.13;
 
 /// Interpolated distances are too high by at most this share of a cell (`MATH` section 4) ...
 const TOO_HIGH: f64 = 0.26;
@@ -39,55 +59,42 @@ const TOLERANCE: f64 = 2e-4;
 /// ... but where the clearance is kept anyway, to this.
 const LOOSE: f64 = 5e-3;
 
-/// A shape with its place, and balls that cover it.
-struct Placed {
-    convex: Convex,
-    /// Largest ball about the centre inside the shape, m.
-    inner: f64,
-    /// Half extents of the shape's own bounding box, m.
-    half: [f64; 3],
-    /// Radius of the ball about the centre that holds the shape, m.
-    radius: f64,
-    /// Centres (shape frame) and one radius of balls that cover the shape.
-    balls: Vec<Vector3<f64>>,
-    ball_radius: f64,
-    /// base <- shape; one for a rigid shape, else one a posture.
-    poses: Vec<Posed>,
-    /// No point of the shape is farther from the base's vertical axis, m.
-    reach: f64,
-    /// Per joint: no point moves farther when the joint moves by one step, m.
-    step_moves: Vec<f64>,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Posed {
-    rotation: Matrix3<f64>,
-    centre: Vector3<f64>,
-}
-
-impl Posed {
-    fn under(&self, base: Pose2) -> Self {
-        let (sin, cos) = base.yaw.sin_cos();
-        let turn = Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0);
-        Self { rotation: turn * self.rotation, centre: turn * self.centre + Vector3::new(base.x, base.y, 0.0) }
-    }
-
-    fn support(&self, convex: &Convex, direction: &Vector3<f64>) -> Vector3<f64> {
-        self.centre + self.rotation * convex.support(&self.rotation.tr_mul(direction))
-    }
-}
-
 /// Two poses of a shape whose hull, grown by `bulge`, holds the shape at every instant between.
 struct Sweep {
     ends: [Posed; 2],
     bulge: f64,
 }
 
+/// A motion with what is asked of it for every shape and posture.
+struct Course {
+    motion: BaseMotion,
+    middle: Base,
+    half_drive: f64,
+    half_turn: f64,
+    parts: OnceCell<[Base; PARTS]>,
+    ends: OnceCell<[Base; 2]>,
+    near: OnceCell<Near>,
+}
+
+impl Course {
+    fn new(motion: &BaseMotion) -> Self {
+        Self {
+            motion: *motion,
+            middle: motion.middle().into(),
+            half_drive: 0.5 * motion.from.distance(motion.to),
+            half_turn: 0.5 * (motion.to.yaw - motion.from.yaw).abs(),
+            parts: OnceCell::new(),
+            ends: OnceCell::new(),
+            near: OnceCell::new(),
+        }
+    }
+}
+
 /// Obstacles near a motion.
 struct Near {
     boxes: Vec<Aabb>,
     /// Unit normal of the slab that separated the last pair of bodies that were looked at closely.
-    hint: Vector3<f64>,
+    hint: Cell<Vector3<f64>>,
 }
 
 /// The nearest obstacle of a pose, for people.
@@ -113,10 +120,17 @@ pub(super) struct Collider<'a, const W: usize> {
     moving: Vec<Placed>,
     /// Height of the centre, and radius, of a ball about the base's axis that holds the robot in every posture.
     ball: (f64, f64),
+    /// Largest horizontal distance of any point of the robot from the base's axis, over all postures, m.
+    pub reach: f64,
     /// z range of the robot over all postures.
     heights: [f64; 2],
     /// Order in which postures are looked at: coarse first.
     order: Vec<usize>,
+    all: Bits<W>,
+    /// A point (base frame) inside a rigid shape and how deep it lies there, m: the deepest known.
+    deepest: Option<(Vector3<f64>, f64)>,
+    /// Obstacles that a motion with its middle in a tile of the plane may come near, of the tiles that were asked for.
+    tiles: RefCell<BTreeMap<[i32; 2], Vec<Aabb>>>,
 }
 
 impl<'a, const W: usize> Collider<'a, W> {
@@ -126,10 +140,7 @@ impl<'a, const W: usize> Collider<'a, W> {
         let postures: Vec<_> = (0..grid.count()).map(|p| robot.shape_poses(&grid.joints(p))).collect();
         let neighbours = Neighbours::new(&grid);
         for (s, shape) in robot.shapes.iter().enumerate() {
-            let place = |p: &Vec<nalgebra::Isometry3<f64>>| Posed {
-                rotation: p[s].rotation.to_rotation_matrix().into_inner(),
-                centre: p[s].translation.vector,
-            };
+            let place = |p: &Vec<nalgebra::Isometry3<f64>>| Posed::new(&p[s]);
             if is_moved(robot, shape.body) {
                 let poses: Vec<Posed> = postures.iter().map(place).collect();
                 moving.push(Placed::new(&shape.convex, poses, &grid));
@@ -161,12 +172,32 @@ impl<'a, const W: usize> Collider<'a, W> {
                 }
             }
         }
-        Self { robot, esdf, map, clearance, grid, neighbours, rigid, moving, ball, heights, order }
+        let all = Bits::all(grid.count());
+        let balls = rigid.iter().flat_map(|placed| &placed.balls);
+        let deepest = balls.filter_map(|ball| Some((ball.centres[0], ball.inner?))).max_by(|a, b| a.1.total_cmp(&b.1));
+        let tiles = RefCell::default();
+        Self {
+            robot,
+            esdf,
+            map,
+            clearance,
+            grid,
+            neighbours,
+            rigid,
+            moving,
+            ball,
+            reach,
+            heights,
+            order,
+            all,
+            deepest,
+            tiles,
+        }
     }
 
     /// All postures.
     pub fn all(&self) -> Bits<W> {
-        Bits::all(self.grid.count())
+        self.all
     }
 
     /// Side of the map's cells, m.
@@ -174,28 +205,20 @@ impl<'a, const W: usize> Collider<'a, W> {
         self.map.resolution
     }
 
-    /// Largest horizontal distance of any point of the robot from the base's axis, over all postures, m.
-    pub fn reach(&self) -> f64 {
-        self.rigid.iter().chain(&self.moving).map(|p| p.reach).fold(0.0, f64::max)
-    }
-
     /// The postures that keep the clearance all along a motion.
     pub fn free(&self, motion: &BaseMotion) -> Bits<W> {
         let middle = motion.middle();
-        let half_drive = 0.5 * motion.from.distance(motion.to);
-        let far = self.clearance + TOO_HIGH * self.map.resolution;
-        if self.esdf.distance([middle.x, middle.y, self.ball.0]) >= self.ball.1 + half_drive + far {
-            return self.all();
+        let around = self.esdf.distance([middle.x, middle.y, self.ball.0]) - TOO_HIGH * self.map.resolution;
+        let course = Course::new(motion);
+        if around >= self.ball.1 + course.half_drive + self.clearance {
+            return self.all;
         }
-        let mut near = None;
-        for placed in &self.rigid {
-            if self.gap(placed, 0, motion, 0.0, &mut near).lower < self.clearance {
-                return Bits::EMPTY;
-            }
+        if self.rigid.iter().any(|placed| self.gap(placed, 0, &course, 0.0).lower < self.clearance) {
+            return Bits::EMPTY;
         }
-        let mut free = self.all();
+        let mut free = self.all;
         for placed in &self.moving {
-            free = self.free_postures(placed, motion, free, &mut near);
+            free = self.free_postures(placed, &course, free);
             if free.is_empty() {
                 break;
             }
@@ -203,8 +226,30 @@ impl<'a, const W: usize> Collider<'a, W> {
         free
     }
 
+    /// Where a straight drive is tightest for the deepest point of the rigid shapes, m of it; `None`: it does not get through.
+    pub fn tightest(&self, from: Pose2, to: Pose2) -> Option<f64> {
+        let length = from.distance(to);
+        let Some((centre, inner)) = self.deepest else { return Some(0.0) };
+        let base: Base = from.into();
+        let (mut along, mut tightest) = (0.0, (f64::INFINITY, 0.0));
+        while along <= length {
+            let share = along / length.max(1e-9);
+            let at = base.moved_to(from.x + share * (to.x - from.x), from.y + share * (to.y - from.y));
+            let room = self.esdf.distance(at.map(&centre)) + TOO_LOW * self.map.resolution - inner - self.clearance;
+            if room < 0.0 {
+                return None;
+            }
+            if room < tightest.0 {
+                tightest = (room, along);
+            }
+            // Room is not lost faster than it is driven through.
+            along += room.max(self.map.resolution);
+        }
+        Some(tightest.1)
+    }
+
     /// Those of `alive` in which one moving shape is clear.
-    fn free_postures(&self, placed: &Placed, motion: &BaseMotion, alive: Bits<W>, near: &mut Option<Near>) -> Bits<W> {
+    fn free_postures(&self, placed: &Placed, course: &Course, alive: Bits<W>) -> Bits<W> {
         let mut open = alive;
         let mut free = Bits::EMPTY;
         let useful = 6.0 * placed.step_moves.iter().fold(0.0f64, |a, b| a.max(*b));
@@ -212,7 +257,7 @@ impl<'a, const W: usize> Collider<'a, W> {
             if !open.contains(posture) {
                 continue;
             }
-            let gap = self.gap(placed, posture, motion, useful, near);
+            let gap = self.gap(placed, posture, course, useful);
             let (is_free, margin) = if gap.lower >= self.clearance {
                 (true, gap.lower - self.clearance)
             } else {
@@ -244,59 +289,106 @@ impl<'a, const W: usize> Collider<'a, W> {
     }
 
     /// Bounds on the clearance of one shape along a motion; not refined beyond `clearance + useful`.
-    fn gap(
-        &self,
-        placed: &Placed,
-        posture: usize,
-        motion: &BaseMotion,
-        useful: f64,
-        near: &mut Option<Near>,
-    ) -> gjk::Gap {
+    fn gap(&self, placed: &Placed, posture: usize, course: &Course, useful: f64) -> gjk::Gap {
+        let moves = course.half_drive + placed.reach * course.half_turn;
+        let slack = TOO_HIGH * self.map.resolution;
         let pose = &placed.poses[posture];
-        let half_turn = 0.5 * motion.turn();
-        let moves = 0.5 * motion.from.distance(motion.to) + placed.reach * half_turn;
-        let middle = pose.under(motion.middle());
-        let c = middle.centre;
-        let slack = TOO_HIGH * self.map.resolution + moves;
-        let whole = self.esdf.distance([c.x, c.y, c.z]) - slack - placed.radius;
-        if whole >= self.clearance {
-            return gjk::Gap { lower: whole, upper: f64::INFINITY };
-        }
-        let mut lower = f64::INFINITY;
-        for ball in &placed.balls {
-            let c = middle.centre + middle.rotation * ball;
-            let distance = self.esdf.distance([c.x, c.y, c.z]);
-            let upper =
-                distance + TOO_LOW * self.map.resolution - if placed.balls.len() == 1 { placed.inner } else { 0.0 };
-            if upper < self.clearance {
-                return gjk::Gap { lower: upper.min(0.0), upper };
-            }
-            lower = lower.min(distance - slack - placed.ball_radius);
-        }
+        let clear = |lower: f64| gjk::Gap { lower, upper: f64::INFINITY };
+        let whole = |base: &Base| self.esdf.distance(base.map(&pose.centre)) - slack - placed.radius;
+        let lower = whole(&course.middle) - moves;
         if lower >= self.clearance {
-            return gjk::Gap { lower, upper: f64::INFINITY };
+            return clear(lower);
         }
-        let ends = [pose.under(motion.from), pose.under(motion.to)];
-        let sweep = Sweep { ends, bulge: placed.reach * (1.0 - half_turn.cos()) };
-        let near = near.get_or_insert_with(|| self.near(motion));
+        let lower = match self.ball_gap(placed, posture, &course.middle) {
+            Err(upper) => return gjk::Gap { lower: upper.min(0.0), upper },
+            Ok(gap) => gap - slack - moves,
+        };
+        if lower >= self.clearance {
+            return clear(lower);
+        }
+        // In parts the balls' bound gains what they move, at best.
+        if lower + moves >= self.clearance {
+            let own = moves / PARTS as f64;
+            let mut least = f64::INFINITY;
+            for base in course.parts.get_or_init(|| course.motion.parts()) {
+                let lower = whole(base) - own;
+                if lower >= self.clearance {
+                    least = least.min(lower);
+                    continue;
+                }
+                match self.ball_gap(placed, posture, base) {
+                    Err(upper) => return gjk::Gap { lower: upper.min(0.0), upper },
+                    Ok(gap) => least = least.min(gap - slack - own),
+                }
+                if least < self.clearance {
+                    break;
+                }
+            }
+            if least >= self.clearance {
+                return clear(least);
+            }
+        }
+        let ends = course.ends.get_or_init(|| [course.motion.from.into(), course.motion.to.into()]);
+        let ends = [pose.under(&ends[0]), pose.under(&ends[1])];
+        let sweep = Sweep { ends, bulge: placed.reach * (1.0 - course.half_turn.cos()) };
+        let near = course.near.get_or_init(|| self.near(course));
         self.exact_gap(placed, &sweep, near, self.clearance + useful)
     }
 
+    /// Distance of the balls that cover a shape, by the field.
+    ///
+    /// # Errors
+    /// An upper bound of the shape's clearance where it is too low.
+    fn ball_gap(&self, placed: &Placed, posture: usize, base: &Base) -> Result<f64, f64> {
+        let mut least = f64::INFINITY;
+        for ball in &placed.balls {
+            let distance = self.esdf.distance(base.map(&ball.centres[posture]));
+            if let Some(inner) = ball.inner {
+                let upper = distance + TOO_LOW * self.map.resolution - inner;
+                if upper < self.clearance {
+                    return Err(upper);
+                }
+            }
+            least = least.min(distance);
+        }
+        Ok(least - placed.ball_radius)
+    }
+
     /// Obstacles that any part of the robot could come near.
-    fn near(&self, motion: &BaseMotion) -> Near {
-        let reach = self.reach() + self.clearance + 0.1;
-        let (a, b) = (motion.from, motion.to);
-        let region = Aabb {
-            min: [a.x.min(b.x) - reach, a.y.min(b.y) - reach, self.heights[0] - self.clearance - 0.1],
-            max: [a.x.max(b.x) + reach, a.y.max(b.y) + reach, self.heights[1] + self.clearance + 0.1],
-        };
-        let mut boxes = Vec::new();
-        obstacles::collect(self.map, &region, &mut boxes);
-        Near { boxes, hint: Vector3::x() }
+    fn near(&self, course: &Course) -> Near {
+        let BaseMotion { from: a, to: b } = course.motion;
+        let reach = self.reach + self.clearance + 0.1;
+        let region = self.region([a.x.min(b.x), a.y.min(b.y)], [a.x.max(b.x), a.y.max(b.y)], reach);
+        let hint = Cell::new(Vector3::x());
+        if course.half_drive > TILE_MARGIN {
+            let mut boxes = Vec::new();
+            obstacles::collect(self.map, &region, &mut boxes);
+            return Near { boxes, hint };
+        }
+        let Pose2 { x, y, .. } = course.motion.middle();
+        let tile = [x, y].map(|v| (v / TILE).floor() as i32);
+        let mut tiles = self.tiles.borrow_mut();
+        let around = tiles.entry(tile).or_insert_with(|| {
+            let low = tile.map(|t| f64::from(t) * TILE);
+            let mut boxes = Vec::new();
+            let region = self.region(low, low.map(|v| v + TILE), reach + TILE_MARGIN);
+            obstacles::collect(self.map, &region, &mut boxes);
+            boxes
+        });
+        Near { boxes: around.iter().filter(|b| box_gap(b, &region) == 0.0).copied().collect(), hint }
+    }
+
+    /// A rectangle grown by a margin, over the robot's heights.
+    fn region(&self, low: [f64; 2], high: [f64; 2], margin: f64) -> Aabb {
+        let z = self.clearance + 0.1;
+        Aabb {
+            min: [low[0] - margin, low[1] - margin, self.heights[0] - z],
+            max: [high[0] + margin, high[1] + margin, self.heights[1] + z],
+        }
     }
 
     /// Bounds on the distance of a swept shape to the boxes and the map's edge, as far as `cap`.
-    fn exact_gap(&self, placed: &Placed, sweep: &Sweep, near: &mut Near, cap: f64) -> gjk::Gap {
+    fn exact_gap(&self, placed: &Placed, sweep: &Sweep, near: &Near, cap: f64) -> gjk::Gap {
         let Near { boxes, hint } = near;
         let bounds = sweep_bounds(placed, sweep);
         let mut gap = gjk::Gap { lower: cap, upper: f64::INFINITY };
@@ -324,7 +416,8 @@ impl<'a, const W: usize> Collider<'a, W> {
                 far - Vector3::from_fn(|i, _| if d[i] > 0.0 { obstacle.min[i] } else { obstacle.max[i] })
             };
             // What separated the last pair often separates this one.
-            if hint.dot(&support(&-*hint)) >= reached {
+            let normal = hint.get();
+            if normal.dot(&support(&-normal)) >= reached {
                 continue;
             }
             let middle = Vector3::from_fn(|i, _| 0.5 * (obstacle.min[i] + obstacle.max[i]));
@@ -336,7 +429,7 @@ impl<'a, const W: usize> Collider<'a, W> {
             };
             let (found, direction) = gjk::with_direction(support, a.centre - middle, enough);
             if found.upper > 0.0 {
-                *hint = direction / found.upper;
+                hint.set(direction / found.upper);
             }
             gap.lower = gap.lower.min(found.lower - sweep.bulge);
             gap.upper = gap.upper.min(found.upper);
@@ -349,7 +442,7 @@ impl<'a, const W: usize> Collider<'a, W> {
 
     /// The nearest obstacle of a pose in one posture, exactly.
     pub fn contact(&self, pose: Pose2, joints: &[f64]) -> Contact {
-        let reach = self.reach() + 1.0;
+        let reach = self.reach + 1.0;
         let region = Aabb {
             min: [pose.x - reach, pose.y - reach, self.heights[0] - 1.0],
             max: [pose.x + reach, pose.y + reach, self.heights[1] + 1.0],
@@ -358,16 +451,14 @@ impl<'a, const W: usize> Collider<'a, W> {
         obstacles::collect(self.map, &region, &mut boxes);
         let mut best = Contact { link: self.robot.name.clone(), obstacle: None, clearance: f64::INFINITY };
         for (shape, place) in self.robot.shapes.iter().zip(self.robot.shape_poses(joints)) {
-            let posed =
-                Posed { rotation: place.rotation.to_rotation_matrix().into_inner(), centre: place.translation.vector };
-            let posed = posed.under(pose);
+            let posed = Posed::new(&place).under(&pose.into());
             let mut take = |clearance: f64, obstacle: Option<Aabb>| {
                 if clearance < best.clearance {
                     best = Contact { link: shape.link.clone(), obstacle, clearance };
                 }
             };
             if self.map.outside == Unknown::Occupied {
-                take(edge_distance(&self.map.bounds(), &posed_bounds(&shape.convex, &posed)), None);
+                take(edge_distance(&self.map.bounds(), &posed.bounds(&shape.convex)), None);
             }
             for obstacle in &boxes {
                 let apart = |d: &Vector3<f64>| {
@@ -415,67 +506,8 @@ fn is_moved(robot: &RobotModel, mut body: usize) -> bool {
     }
 }
 
-impl Placed {
-    fn new(convex: &Convex, poses: Vec<Posed>, grid: &PostureGrid) -> Self {
-        let half = convex.half_extents();
-        let inner = match convex {
-            Convex::Hull { .. } => 0.0,
-            _ => half.iter().copied().fold(f64::INFINITY, f64::min),
-        };
-        let (balls, ball_radius) = cover(half, convex.bounding_radius());
-        let radius = convex.bounding_radius();
-        let step_moves = grid
-            .axes()
-            .map(|(count, stride)| {
-                let pairs = (0..poses.len()).filter(|p| poses.len() > 1 && p / stride % count + 1 < count);
-                let between = |p: usize| {
-                    let (a, b) = (&poses[p], &poses[p + stride]);
-                    (a.centre - b.centre).norm() + (a.rotation - b.rotation).norm() * radius
-                };
-                pairs.map(between).fold(0.0, f64::max)
-            })
-            .collect::<Vec<f64>>();
-        // Farthest from the axis over all directions; between sampled postures half a step may be added.
-        let mut reach = 0.0f64;
-        for pose in &poses {
-            for k in 0..64 {
-                let angle = std::f64::consts::TAU * f64::from(k) / 64.0;
-                let d = Vector3::new(angle.cos(), angle.sin(), 0.0);
-                reach = reach.max(pose.support(convex, &d).dot(&d));
-            }
-        }
-        // A point at distance R shows at least R cos(pi/64) in one of 64 directions.
-        reach = reach / (std::f64::consts::PI / 64.0).cos() + step_moves.iter().sum::<f64>() / 2.0;
-        Self { convex: convex.clone(), inner, half, radius, balls, ball_radius, poses, reach, step_moves }
-    }
-}
-
-/// Balls that cover a box: as many along each axis as make them about as wide as the box's least side.
-fn cover(half: [f64; 3], bounding: f64) -> (Vec<Vector3<f64>>, f64) {
-    let least = half.iter().copied().fold(f64::INFINITY, f64::min).max(0.03);
-    let counts = half.map(|h| ((h / least / 1.5).ceil() as usize).clamp(1, 6));
-    let part: [f64; 3] = std::array::from_fn(|a| half[a] / counts[a] as f64);
-    let radius = part.iter().map(|h| h * h).sum::<f64>().sqrt();
-    if counts == [1; 3] {
-        return (vec![Vector3::zeros()], bounding.min(radius));
-    }
-    let centre = |a: usize, k: usize| -half[a] + part[a] * (2 * k + 1) as f64;
-    let mut balls = Vec::new();
-    for i in 0..counts[0] {
-        for j in 0..counts[1] {
-            balls.extend((0..counts[2]).map(|k| Vector3::new(centre(0, i), centre(1, j), centre(2, k))));
-        }
-    }
-    (balls, radius)
-}
-
-fn posed_bounds(convex: &Convex, posed: &Posed) -> Aabb {
-    let end = |a: usize, sign: f64| posed.support(convex, &Vector3::ith(a, sign))[a];
-    Aabb { min: std::array::from_fn(|a| end(a, -1.0)), max: std::array::from_fn(|a| end(a, 1.0)) }
-}
-
 fn sweep_bounds(placed: &Placed, sweep: &Sweep) -> Aabb {
-    let [a, b] = [0, 1].map(|e| posed_bounds(&placed.convex, &sweep.ends[e]));
+    let [a, b] = [0, 1].map(|e| sweep.ends[e].bounds(&placed.convex));
     Aabb { min: std::array::from_fn(|i| a.min[i].min(b.min[i])), max: std::array::from_fn(|i| a.max[i].max(b.max[i])) }
 }
 

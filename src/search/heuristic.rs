@@ -3,7 +3,7 @@
 //! but for the eight directions; where it says that a position is shut off, no motion of the robot gets there.
 
 use super::lattice::Lattice;
-use crate::esdf;
+use crate::esdf::{self, Esdf};
 use crate::geom::Pose2;
 use crate::map::VoxelMap;
 use crate::robot::{Convex, RobotModel};
@@ -45,6 +45,14 @@ impl Core {
             }
         }
         best.unwrap_or(Self { offset: [0.0; 2], radius: 0.0, heights: [0.1, 0.1] })
+    }
+
+    /// Clearance with the centre at a position, m: a guess from the field at one height. The ball there that is as wide as the
+    /// disc does not rise above the robot's own shape, where its height allows.
+    pub fn guessed_clearance(&self, esdf: &Esdf, [x, y]: [f64; 2]) -> f64 {
+        let [low, high] = self.heights;
+        let z = (high - self.radius).clamp(low, 0.5 * (low + high));
+        esdf.distance([x, y, z]) - self.radius
     }
 
     /// Where the centre is in a pose.
@@ -100,7 +108,7 @@ pub(super) const NEIGHBOURS: [(i32, i32, u32); 8] =
     [(1, 0, 10), (0, 1, 10), (-1, 0, 10), (0, -1, 10), (1, 1, 14), (1, -1, 14), (-1, 1, 14), (-1, -1, 14)];
 
 /// Least clearance of the core, as interpolated at a lattice position, with which its centre may pass within 0.71 steps.
-fn least_clearance(lattice: &Lattice, resolution: f64, clearance: f64) -> f32 {
+pub(super) fn least_clearance(lattice: &Lattice, resolution: f64, clearance: f64) -> f32 {
     let on_nodes = (lattice.step / resolution + 1e-6).fract() < 2e-6;
     let slack = 0.71 * lattice.step + if on_nodes { 0.0 } else { 0.87 * resolution };
     (clearance - slack) as f32 - 1e-5

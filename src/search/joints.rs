@@ -7,7 +7,8 @@ use super::posture::{Bits, Neighbours};
 const STEP: u32 = 2;
 /// ... and beyond it this: the base must wait.
 const WAIT: u32 = 20;
-/// Being one, two, three steps from a posture that is not free costs this a piece: room for the optimiser.
+/// Being one, two, three steps from a posture that is not free, or from beyond a joint's range, costs this a piece: room for the
+/// optimiser.
 const CLOSE: [u32; 3] = [12, 6, 3];
 
 const UNREACHED: u32 = u32::MAX / 2;
@@ -15,14 +16,14 @@ const UNREACHED: u32 = u32::MAX / 2;
 /// One posture before each piece and one after the last, so `masks.len() + 1`; `None` where none gets through.
 ///
 /// `masks`: free postures of each piece; a change during a piece passes only through its free postures. `rates`: steps that
-/// there is time for in each piece.
+/// there is time for in each piece. `brinks`: postures at the ends of the ranges of joints that need not be there.
 pub(super) fn choose<const W: usize>(
     neighbours: &Neighbours<W>,
     count: usize,
     masks: &[Bits<W>],
     rates: &[usize],
-    start: Bits<W>,
-    goal: Bits<W>,
+    [start, goal]: [Bits<W>; 2],
+    brinks: Bits<W>,
 ) -> Option<Vec<usize>> {
     let mut cost: Vec<u32> = (0..count).map(|p| if start.contains(p) { 0 } else { UNREACHED }).collect();
     let mut came_from: Vec<Vec<u32>> = Vec::with_capacity(masks.len());
@@ -40,10 +41,10 @@ pub(super) fn choose<const W: usize>(
         }
         while relax(neighbours, *mask, WAIT, &mut cost, &mut from) {}
         let mut near = *mask;
-        for close in CLOSE {
+        for (k, close) in CLOSE.into_iter().enumerate() {
             // Postures that have a neighbour outside: not in the mask's interior.
             let outside = Bits::all(count).minus(near);
-            let edge = neighbours.dilate(outside, near);
+            let edge = neighbours.dilate(outside, near).or(if k == 0 { brinks.and(near) } else { Bits::EMPTY });
             edge.iter().for_each(|p| cost[p] = cost[p].saturating_add(close));
             near = near.minus(edge);
         }
@@ -129,7 +130,7 @@ mod tests {
     #[test]
     fn a_change_is_spread_over_the_pieces_that_have_time_for_it() {
         let masks = [line(0..64), line(0..64), line(0..64), line(30..64)];
-        let path = choose(&one_joint(), 64, &masks, &[12; 4], line(0..1), line(0..64)).expect("a way");
+        let path = choose(&one_joint(), 64, &masks, &[12; 4], [line(0..1), line(0..64)], Bits::EMPTY).expect("a way");
         assert_eq!(path.len(), 5);
         for (k, pair) in path.windows(2).enumerate() {
             assert!(pair[0].abs_diff(pair[1]) <= 12, "piece {k}: {path:?}");
@@ -138,10 +139,25 @@ mod tests {
     }
 
     #[test]
+    fn a_joint_that_may_start_anywhere_keeps_off_the_ends_of_its_range() {
+        let brinks = line(0..1).or(line(63..64));
+        let free = |start, brinks| {
+            choose(&one_joint(), 64, &[line(0..64); 5], &[64; 5], [start, line(0..64)], brinks).expect("a way")
+        };
+        let path = free(line(0..64), brinks);
+        assert!(path.iter().all(|p| (3..61).contains(p) && *p == path[0]), "{path:?}");
+        // What is asked for is kept, and nothing moves for its own sake.
+        assert_eq!(free(line(0..1), Bits::EMPTY), [0; 6]);
+    }
+
+    #[test]
     fn a_gap_in_the_free_postures_is_not_jumped() {
         let mut split = line(0..20);
         split = split.or(line(30..64));
-        assert!(choose(&one_joint(), 64, &[split], &[64], line(0..1), line(40..41)).is_none());
-        assert!(choose(&one_joint(), 64, &[split, line(0..64)], &[64, 64], line(0..1), line(40..41)).is_some());
+        assert!(choose(&one_joint(), 64, &[split], &[64], [line(0..1), line(40..41)], Bits::EMPTY).is_none());
+        assert!(
+            choose(&one_joint(), 64, &[split, line(0..64)], &[64, 64], [line(0..1), line(40..41)], Bits::EMPTY)
+                .is_some()
+        );
     }
 }

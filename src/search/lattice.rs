@@ -4,6 +4,7 @@
 //! A drive leaves along the *exact* direction between the two positions, at most half a heading off: the base first spins
 //! to it. So every move is exactly drivable and ends exactly on the lattice; there is no hybrid state to round.
 
+use std::cell::OnceCell;
 use std::f64::consts::TAU;
 
 use crate::geom::{Pose2, wrap_angle};
@@ -42,8 +43,8 @@ pub(super) struct Lattice {
     pub step: f64,
     /// Positions along x and y.
     pub size: [i32; 2],
-    /// Drives by heading index.
-    drives: Vec<Vec<Drive>>,
+    /// Drives by heading index, once they are asked for.
+    drives: OnceCell<Vec<Vec<Drive>>>,
 }
 
 pub(super) fn heading_angle(heading: i32) -> f64 {
@@ -62,7 +63,7 @@ impl Lattice {
             map.resolution * (SPACING / map.resolution + 1e-9).floor()
         };
         let size = [0, 1].map(|a| (map.dims[a] as f64 * map.resolution / step + 1e-6).floor() as i32 + 1);
-        Self { origin: [map.origin[0], map.origin[1]], step, size, drives: drives(step) }
+        Self { origin: [map.origin[0], map.origin[1]], step, size, drives: OnceCell::new() }
     }
 
     pub fn contains(&self, i: i32, j: i32) -> bool {
@@ -79,7 +80,7 @@ impl Lattice {
     }
 
     pub fn drives(&self, heading: i32) -> &[Drive] {
-        &self.drives[heading as usize]
+        &self.drives.get_or_init(|| drives(self.step))[heading as usize]
     }
 
     /// Continuous lattice coordinates of a point.

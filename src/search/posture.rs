@@ -65,6 +65,18 @@ impl PostureGrid {
         self.values.iter().zip(&self.strides).map(|(v, s)| (v.len(), *s))
     }
 
+    /// Postures with one of these joints at an end of its range.
+    pub fn brinks<const W: usize>(&self, joints: impl Iterator<Item = usize>) -> Bits<W> {
+        let mut out = Bits::EMPTY;
+        for joint in joints {
+            let (count, stride) = (self.values[joint].len(), self.strides[joint]);
+            let at_end = |p: &usize| [0, count - 1].contains(&(p / stride % count));
+            // A joint with one value has nowhere to go.
+            (0..self.count).filter(|p| count > 1 && at_end(p)).for_each(|p| out.insert(p));
+        }
+        out
+    }
+
     /// Distance between neighbouring values of a joint.
     pub fn step(&self, joint: usize) -> f64 {
         let v = &self.values[joint];
@@ -81,9 +93,11 @@ impl<const W: usize> Bits<W> {
 
     /// The first `count` postures.
     pub fn all(count: usize) -> Self {
-        let mut bits = Self::EMPTY;
-        (0..count).for_each(|p| bits.insert(p));
-        bits
+        Self(std::array::from_fn(|w| match count.saturating_sub(64 * w) {
+            0 => 0,
+            rest @ 1..64 => (1 << rest) - 1,
+            _ => u64::MAX,
+        }))
     }
 
     pub fn insert(&mut self, posture: usize) {

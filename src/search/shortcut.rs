@@ -1,5 +1,8 @@
 //! Fewer corners: straight drives that skip corners of a route, where the postures still get through.
 
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
 use super::astar::TURN_COST;
 use super::collide::{BaseMotion, Collider};
 use super::posture::Bits;
@@ -22,7 +25,14 @@ pub(super) struct Shortcutter<'a, const W: usize> {
     /// Whether the last turn may change: the goal leaves the heading open.
     pub open_end: bool,
     pub grain: Grain,
+    /// Free postures of the drives that were asked for.
+    drives: RefCell<BTreeMap<DriveKey, Masks<W>>>,
 }
+
+/// Ends of a drive, and the heading's sense, bit by bit.
+type DriveKey = ([u64; 4], bool);
+/// Free postures of pieces in order; `None`: one is blocked.
+type Masks<const W: usize> = Option<Vec<Bits<W>>>;
 
 impl<const W: usize> CheckedRoute<W> {
     /// Free postures of all pieces, in the order of [`Route::pieces`].
@@ -38,61 +48,80 @@ impl<const W: usize> CheckedRoute<W> {
     }
 }
 
-impl<const W: usize> Shortcutter<'_, W> {
+impl<'a, const W: usize> Shortcutter<'a, W> {
+    pub fn new(collider: &'a Collider<'a, W>, ends: [Bits<W>; 2], open_end: bool, grain: Grain) -> Self {
+        let [start_postures, goal_postures] = ends;
+        Self { collider, start_postures, goal_postures, open_end, grain, drives: RefCell::default() }
+    }
+
     /// Checks all pieces of a route.
     ///
     /// # Errors
-    /// About where it is blocked, or the postures do not get through.
-    pub fn check(&self, route: Route) -> Result<CheckedRoute<W>, [f64; 2]> {
+    /// About where it is blocked, or the postures do not get through: all such places, each as if the ones before were free.
+    pub fn check(&self, route: Route) -> Result<CheckedRoute<W>, Vec<[f64; 2]>> {
         let headings = headings_at_corners(&route);
         let mut checked = CheckedRoute { turns: Vec::new(), drives: Vec::new(), route };
+        let mut blocked = Vec::new();
         let mut set = self.start_postures;
+        let mut pass = |mask: Bits<W>, place: [f64; 2]| {
+            set = self.collider.neighbours.flood(set, mask);
+            if set.is_empty() {
+                blocked.push(place);
+                set = self.collider.all();
+            }
+            mask
+        };
         for (k, heading) in headings.iter().enumerate() {
             let (at, turn) = (checked.route.corners[k], checked.route.turns[k]);
-            let turned = self.turn(k, at, *heading, turn).ok_or(at)?;
-            set = self.flow(set, &turned);
-            if set.is_empty() {
-                return Err(at);
-            }
-            checked.turns.push(turned);
+            let pieces = self.turn_pieces(k, at, *heading, turn);
+            checked.turns.push(pieces.iter().map(|piece| pass(self.collider.free(piece), at)).collect());
             let Some(next) = checked.route.corners.get(k + 1).copied() else { continue };
             let mut pieces = Vec::new();
             let yaw = heading + turn;
             drive_pieces(Pose2::new(at[0], at[1], yaw), Pose2::new(next[0], next[1], yaw), self.grain, &mut pieces);
-            let mut driven = Vec::with_capacity(pieces.len());
-            for piece in &pieces {
-                let mask = self.collider.free(piece);
-                set = self.collider.neighbours.flood(set, mask);
-                if set.is_empty() {
-                    return Err([0.5 * (piece.from.x + piece.to.x), 0.5 * (piece.from.y + piece.to.y)]);
-                }
-                driven.push(mask);
-            }
-            checked.drives.push(driven);
+            let middle = |piece: &BaseMotion| [0.5 * (piece.from.x + piece.to.x), 0.5 * (piece.from.y + piece.to.y)];
+            checked.drives.push(pieces.iter().map(|piece| pass(self.collider.free(piece), middle(piece))).collect());
         }
         let end = checked.route.corners[checked.route.corners.len() - 1];
-        if set.and(self.goal_postures).is_empty() { Err(end) } else { Ok(checked) }
+        pass(self.goal_postures, end);
+        if blocked.is_empty() { Ok(checked) } else { Err(blocked) }
     }
 
     /// Free postures of the pieces of a corner's turn; those of the first corner begin with standing still.
-    fn turn(&self, corner: usize, at: [f64; 2], yaw: f64, turn: f64) -> Option<Vec<Bits<W>>> {
+    fn turn(&self, corner: usize, at: [f64; 2], yaw: f64, turn: f64) -> Masks<W> {
+        let pieces = self.turn_pieces(corner, at, yaw, turn);
+        pieces.iter().map(|p| Some(self.collider.free(p)).filter(|m| !m.is_empty())).collect()
+    }
+
+    fn turn_pieces(&self, corner: usize, at: [f64; 2], yaw: f64, turn: f64) -> Vec<BaseMotion> {
         let mut pieces = Vec::new();
         if corner == 0 {
             let pose = Pose2::new(at[0], at[1], yaw);
             pieces.push(BaseMotion { from: pose, to: pose });
         }
         spin_pieces(Pose2::new(at[0], at[1], yaw), turn, self.grain, &mut pieces);
-        self.masks_of(&pieces)
+        pieces
     }
 
-    fn drive(&self, from: [f64; 2], to: [f64; 2], yaw: f64) -> Option<Vec<Bits<W>>> {
+    fn drive(&self, from: [f64; 2], to: [f64; 2], yaw: f64, reverse: bool) -> Masks<W> {
+        let key = ([from[0], from[1], to[0], to[1]].map(f64::to_bits), reverse);
+        self.drives.borrow_mut().entry(key).or_insert_with(|| self.find_drive(from, to, yaw)).clone()
+    }
+
+    fn find_drive(&self, from: [f64; 2], to: [f64; 2], yaw: f64) -> Masks<W> {
+        let [from, to] = [from, to].map(|[x, y]| Pose2::new(x, y, yaw));
+        let tightest = self.collider.tightest(from, to)?;
         let mut pieces = Vec::new();
-        drive_pieces(Pose2::new(from[0], from[1], yaw), Pose2::new(to[0], to[1], yaw), self.grain, &mut pieces);
-        self.masks_of(&pieces)
-    }
-
-    fn masks_of(&self, pieces: &[BaseMotion]) -> Option<Vec<Bits<W>>> {
-        pieces.iter().map(|p| Some(self.collider.free(p)).filter(|m| !m.is_empty())).collect()
+        drive_pieces(from, to, self.grain, &mut pieces);
+        // What blocks a drive most often is where it is tightest.
+        let worst = (tightest / from.distance(to) * pieces.len() as f64) as usize;
+        let worst = worst.min(pieces.len().checked_sub(1)?);
+        let there = self.collider.free(&pieces[worst]);
+        if there.is_empty() {
+            return None;
+        }
+        let free = |(k, piece)| if k == worst { there } else { self.collider.free(piece) };
+        pieces.iter().enumerate().map(|piece| Some(free(piece)).filter(|m| !m.is_empty())).collect()
     }
 
     fn flow(&self, set: Bits<W>, masks: &[Bits<W>]) -> Bits<W> {
@@ -180,8 +209,8 @@ impl<const W: usize> Shortcutter<'_, W> {
         if length + TURN_COST * (turn_a.abs() + turn_b.abs()) >= old - 1e-9 {
             return None;
         }
+        let drive = self.drive(from, to, headings[a] + turn_a, route.reverse[a])?;
         let first = self.turn(a, from, headings[a], turn_a)?;
-        let drive = self.drive(from, to, headings[a] + turn_a)?;
         let second = self.turn(b, to, headings[a] + turn_a, turn_b)?;
         let set = self.flow(self.flow(self.flow(forward[a], &first), &drive), &second);
         if set.and(backward[b]).is_empty() {

@@ -191,19 +191,86 @@ fn what_does_not_fit_is_proven_absent_with_the_gap_that_is_there() {
     let robot = scr_db();
     // 0.40 m for a base of 0.36 m and 0.03 m on both sides.
     match find(&room_with_opening(0.4, 0.9), &robot, &across(None), 0.03) {
-        Err(SearchError::Exhausted { narrowest: Some((radius, [x, _])), core, .. }) => {
-            assert!((radius - 0.2).abs() < 1e-3 && radius < core, "{radius} {core}");
+        Err(SearchError::Exhausted(absence)) => {
+            let (radius, [x, _]) = absence.narrowest.expect("start and goal are on the map");
+            assert!((radius - 0.2).abs() < 1e-3 && radius < absence.core, "{absence:?}");
             assert!((1.35..1.65).contains(&x), "{x}");
+            // 2 cm on each side where 3 are asked for, wherever the base is in the opening.
+            let tight = absence.tightest.as_ref().expect("a robot a little thinner gets through");
+            assert!((1.2..2.0).contains(&tight.pose.x), "{tight:?}");
+            assert!((tight.missing() - 0.01).abs() < 3e-3, "{tight:?}");
+            assert!(absence.to_goal > 0.8 && absence.at_fault.is_none(), "{absence:?}");
         }
         other => panic!("{other:?}"),
     }
     // The same width is enough with less clearance.
     assert!(find(&room_with_opening(0.4, 0.9), &robot, &across(None), 0.015).is_ok());
     // Wide but lower than the robot in any posture (0.28 m).
-    assert!(matches!(
-        find(&room_with_opening(1.2, 0.25), &robot, &across(None), 0.03),
-        Err(SearchError::Exhausted { .. })
-    ));
+    assert!(matches!(find(&room_with_opening(1.2, 0.25), &robot, &across(None), 0.03), Err(SearchError::Exhausted(_))));
+}
+
+#[test]
+fn a_robot_too_wide_for_any_clearance_is_told_the_posture_and_how_much_is_missing() {
+    let robot = scr_db();
+    // 0.30 m for a base of 0.36 m: 3 cm too little on each side, and 3 cm of clearance.
+    match find(&room_with_opening(0.3, 0.9), &robot, &across(None), 0.03) {
+        Err(error @ SearchError::Exhausted(_)) => {
+            let text = error.to_string();
+            assert!(text.contains("link `base_link` is 0.0") && text.contains(", `blade` "), "{text}");
+            let SearchError::Exhausted(absence) = &error else { unreachable!("matched above") };
+            let tight = absence.tightest.as_ref().expect("a much thinner robot gets through");
+            assert!((tight.missing() - 0.06).abs() < 4e-3, "{tight:?}");
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn the_end_that_is_shut_in_is_named() {
+    let robot = small_box();
+    let mut map = VoxelMap::new(0.05, [0.0; 3], [60, 40, 20], Unknown::Occupied);
+    // A pen around the start, 0.5 m wide.
+    for (low, high) in
+        [([0.3, 0.3], [1.0, 0.4]), ([0.3, 0.9], [1.0, 1.0]), ([0.3, 0.3], [0.4, 1.0]), ([0.9, 0.3], [1.0, 1.0])]
+    {
+        fill(&mut map, [low[0], low[1], 0.0], [high[0], high[1], 0.5]);
+    }
+    let (pen, outside) = (Pose2::new(0.65, 0.65, 0.0), Pose2::new(2.4, 1.5, 0.0));
+    let ask = |start: Pose2, goal: Pose2| Query {
+        start,
+        start_joints: vec![],
+        goal,
+        goal_yaw: Some(goal.yaw),
+        goal_joints: vec![],
+    };
+    for (query, end) in [(ask(pen, outside), "start"), (ask(outside, pen), "goal")] {
+        match find(&map, &robot, &query, 0.02) {
+            Err(error @ SearchError::Exhausted(_)) => {
+                assert_eq!(error.is_about_start(), end == "start");
+                let text = error.to_string();
+                assert!(text.contains(&format!("it is the {end} that is shut in")), "{text}");
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn a_blocked_goal_is_told_in_its_best_posture_with_the_nearest_free_pose() {
+    let robot = scr_db();
+    let mut map = VoxelMap::new(0.05, [0.0; 3], [60, 40, 20], Unknown::Occupied);
+    fill(&mut map, [2.5, 0.9, 0.0], [2.6, 1.15, 0.2]);
+    match find(&map, &robot, &across(None), 0.03) {
+        Err(SearchError::GoalBlocked(blocked)) => {
+            assert_eq!(blocked.posture.len(), 1, "{blocked:?}");
+            let free = blocked.nearest.expect("the room is large");
+            let goal = Pose2::new(2.4, 1.05, 0.0);
+            assert!(free.distance(goal) < 0.5, "{blocked:?}");
+            let query = Query { goal: free, goal_yaw: Some(free.yaw), ..across(None) };
+            assert!(find(&map, &robot, &query, 0.03).is_ok(), "{blocked:?}");
+        }
+        other => panic!("{other:?}"),
+    }
 }
 
 #[test]
@@ -212,7 +279,7 @@ fn a_blocked_start_is_told_with_the_link_the_obstacle_and_the_depth() {
     let mut map = VoxelMap::new(0.05, [0.0; 3], [60, 40, 20], Unknown::Occupied);
     fill(&mut map, [0.7, 0.9, 0.0], [0.8, 1.1, 0.2]);
     match find(&map, &robot, &across(Some(0.0)), 0.03) {
-        Err(error @ SearchError::StartBlocked { .. }) => {
+        Err(error @ SearchError::StartBlocked(_)) => {
             let text = error.to_string();
             assert!(text.contains("in collision: link `base_link`") && text.contains("m deep"), "{text}");
         }
@@ -327,11 +394,11 @@ proptest! {
                 let least = distance_along(&map, &robot, &path, 8);
                 prop_assert!(least > clearance - 1.5e-3, "{}", least);
             }
-            Err(SearchError::Exhausted { .. }) => {
+            Err(SearchError::Exhausted(_)) => {
                 prop_assert!(!reachable(&map, &robot, from, to, clearance + 0.002), "a way exists");
             }
             // The start or goal box reaches beyond the map.
-            Err(SearchError::StartBlocked { .. } | SearchError::GoalBlocked { .. }) => {}
+            Err(SearchError::StartBlocked(_) | SearchError::GoalBlocked(_)) => {}
             Err(other) => prop_assert!(false, "{}", other),
         }
     }

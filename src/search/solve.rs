@@ -1,0 +1,275 @@
+//! The tries, one after the other: straight, along the guide's ways, and over the whole lattice.
+
+use super::astar::{self, AStar, Outcome};
+use super::collide::{BaseMotion, Collider};
+use super::guide::{self, Guide};
+use super::heuristic::{self, Core, CostToGo};
+use super::joints;
+use super::lattice::{self, Lattice};
+use super::posture::{Bits, PostureGrid};
+use super::route::{Grain, Route};
+use super::shortcut::{CheckedRoute, Shortcutter};
+use super::{Query, SearchMove, SearchOptions, SearchPath, SearchState};
+use crate::esdf::Esdf;
+use crate::geom::{Pose2, wrap_angle};
+use crate::map::VoxelMap;
+use crate::robot::RobotModel;
+
+/// Sweeps that are cut differently may differ by this in what they find clear, m: bulges of turns and bounds of distances.
+const CHECK_TOLERANCE: f64 = 1e-3;
+
+/// What is searched.
+#[derive(Clone, Copy)]
+pub(super) struct Problem<'a> {
+    pub map: &'a VoxelMap,
+    pub esdf: &'a Esdf,
+    pub robot: &'a RobotModel,
+    pub query: &'a Query,
+    pub options: &'a SearchOptions,
+}
+
+/// An end of the way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum End {
+    Start,
+    Goal,
+}
+
+/// How the lattice search ended without a path.
+pub(super) enum NoPath {
+    /// All that can be reached was looked at.
+    Exhausted {
+        /// Of the base's core at each lattice position, m.
+        core_clearances: Vec<f32>,
+        /// The reached pose nearest to the goal.
+        closest: Pose2,
+        expanded: usize,
+    },
+    /// What was found does not pass the last check.
+    Marginal { expanded: usize },
+    /// As many labels were made as may be.
+    Limit { labels: usize },
+}
+
+/// A problem whose start and goal are free.
+pub(super) struct Solver<'a, const W: usize> {
+    pub problem: Problem<'a>,
+    pub collider: Collider<'a, W>,
+    pub lattice: Lattice,
+    pub core: Core,
+    start_postures: Bits<W>,
+    goal_postures: Bits<W>,
+}
+
+impl<'a, const W: usize> Solver<'a, W> {
+    /// # Errors
+    /// The end that is blocked.
+    pub fn new(problem: Problem<'a>, grid: PostureGrid) -> Result<Self, End> {
+        let Problem { map, esdf, robot, query, options } = problem;
+        let collider = Collider::<W>::new(robot, esdf, map, options.clearance, grid);
+        let start_postures = free_postures(&collider, query.start, &query.start_joints).ok_or(End::Start)?;
+        let goal_postures = goal_postures(&collider, query).ok_or(End::Goal)?;
+        let (lattice, core) = (Lattice::new(map), Core::new(robot));
+        Ok(Self { problem, collider, lattice, core, start_postures, goal_postures })
+    }
+
+    /// The first that passes of the straight ways and the guide's. None proves nothing.
+    pub fn guided(&self) -> Option<SearchPath> {
+        let Problem { esdf, query, options, .. } = self.problem;
+        for route in astar::straight_to_goal(query, options) {
+            if let Ok(path) = self.finish(&route, Grain::COARSE, &self.collider, 0) {
+                return Some(path);
+            }
+        }
+        let [x, y] = self.core.offset;
+        let guess = |place| self.core.guessed_clearance(esdf, place);
+        let mut guide = Guide::new(&self.lattice, guess, options.clearance - x.hypot(y));
+        for attempt in 0..guide::tries(query) {
+            let route = guide.route(query, options, attempt)?;
+            let grain = if attempt == 0 { Grain::COARSE } else { Grain { drive: 0.1, turn: 0.15 } };
+            match self.finish(&route, grain, &self.collider, 0) {
+                Ok(path) => return Some(path),
+                Err(places) => places.into_iter().for_each(|place| guide.avoid(place)),
+            }
+        }
+        None
+    }
+
+    /// A path by the lattice search, or the proof that there is none, or neither after so many labels.
+    ///
+    /// # Errors
+    /// Why there is none.
+    pub fn on_the_lattice(&self, most_labels: usize) -> Result<SearchPath, NoPath> {
+        let Problem { map, esdf, robot, query, options } = self.problem;
+        let (lattice, core, clearance) = (&self.lattice, self.core, options.clearance);
+        let core_clearances = heuristic::core_clearance(lattice, map, &core);
+        let of_core = (core, &core_clearances[..]);
+        let cost_to_go = CostToGo::new(lattice, of_core, map.resolution, clearance, query.goal, query.goal_yaw);
+        let mut expanded_before = 0;
+        for strict in [false, true] {
+            let astar = AStar {
+                lattice,
+                collider: &self.collider,
+                cost_to_go: &cost_to_go,
+                core_clearances: &core_clearances,
+                strict,
+                query,
+                options,
+                most_labels,
+                start_postures: self.start_postures,
+                goal_postures: self.goal_postures,
+            };
+            let (route, expanded) = match astar.search() {
+                Outcome::Found { route, expanded } => (route, expanded + expanded_before),
+                Outcome::Limit { labels } => return Err(NoPath::Limit { labels }),
+                Outcome::Exhausted { closest, expanded } => {
+                    let expanded = expanded + expanded_before;
+                    return Err(NoPath::Exhausted { core_clearances, closest, expanded });
+                }
+            };
+            expanded_before = expanded;
+            if let Ok(path) = self.finish(&route, Grain::COARSE, &self.collider, expanded) {
+                return Ok(path);
+            }
+            // At the lattice's own grain whatever the search got through passes, but for the tolerance of the checks.
+            let lenient = (clearance - CHECK_TOLERANCE).max(0.0);
+            let lenient = Collider::<W>::new(robot, esdf, map, lenient, self.collider.grid.clone());
+            if let Ok(path) = self.finish(&route, Grain::FINE, &lenient, expanded) {
+                return Ok(path);
+            }
+        }
+        // The fine check asks no more than the strict search did, but for the tolerance of the checks.
+        Err(NoPath::Marginal { expanded: expanded_before })
+    }
+
+    /// The route checked, shortened and with its joints.
+    ///
+    /// # Errors
+    /// About where it is blocked, all along.
+    fn finish(
+        &self,
+        route: &Route,
+        grain: Grain,
+        collider: &Collider<'_, W>,
+        expanded: usize,
+    ) -> Result<SearchPath, Vec<[f64; 2]>> {
+        let open_end = self.problem.query.goal_yaw.is_none();
+        let ends = [self.start_postures, self.goal_postures];
+        let shortcutter = Shortcutter::new(collider, ends, open_end, grain);
+        let checked = shortcutter.shorten(shortcutter.check(route.clone())?);
+        let pieces = checked.route.pieces(grain);
+        let Problem { robot, query, .. } = self.problem;
+        Ok(with_joints(collider, robot, query, &checked, &pieces, ends, expanded))
+    }
+}
+
+/// Postures that are free in a pose and agree with what is asked for.
+fn free_postures<const W: usize>(collider: &Collider<'_, W>, pose: Pose2, joints: &[Option<f64>]) -> Option<Bits<W>> {
+    let mut wanted = collider.free(&BaseMotion { from: pose, to: pose });
+    for p in wanted.iter() {
+        if !agrees(&collider.grid, p, joints) {
+            wanted.remove(p);
+        }
+    }
+    (!wanted.is_empty()).then_some(wanted)
+}
+
+/// Whether a sampled posture is the nearest one to what is asked for.
+pub(super) fn agrees(grid: &PostureGrid, posture: usize, joints: &[Option<f64>]) -> bool {
+    let own = grid.joints(posture);
+    let wanted: Vec<f64> = joints.iter().zip(&own).map(|(asked, own)| asked.unwrap_or(*own)).collect();
+    grid.nearest(&wanted) == posture
+}
+
+/// Postures free at the goal, in any heading that will do.
+fn goal_postures<const W: usize>(collider: &Collider<'_, W>, query: &Query) -> Option<Bits<W>> {
+    let headings = goal_headings(query).into_iter();
+    let free = |yaw| free_postures(collider, Pose2 { yaw, ..query.goal }, &query.goal_joints);
+    headings.filter_map(free).reduce(Bits::or)
+}
+
+/// The heading that is asked for at the goal, or those of the lattice.
+pub(super) fn goal_headings(query: &Query) -> Vec<f64> {
+    let any = || (0..lattice::HEADINGS as i32).map(lattice::heading_angle).collect();
+    query.goal_yaw.map_or_else(any, |yaw| vec![yaw])
+}
+
+/// The route with the joints' path: states after each piece, those that only continue the one before left out.
+fn with_joints<const W: usize>(
+    collider: &Collider<'_, W>,
+    robot: &RobotModel,
+    query: &Query,
+    checked: &CheckedRoute<W>,
+    pieces: &[BaseMotion],
+    [start_postures, goal_postures]: [Bits<W>; 2],
+    expanded: usize,
+) -> SearchPath {
+    let masks = checked.masks();
+    let rates: Vec<usize> = pieces.iter().map(|piece| steps_in_time(robot, &collider.grid, piece)).collect();
+    // The optimiser's curves need some room to swing within the ranges, too.
+    let open = (0..robot.joints.len()).filter(|m| query.start_joints[*m].or(query.goal_joints[*m]).is_none());
+    let brinks = collider.grid.brinks(open);
+    let ends = [start_postures, goal_postures];
+    let postures = joints::choose(&collider.neighbours, collider.grid.count(), &masks, &rates, ends, brinks)
+        .expect("the checked route passes postures from start to goal");
+    let exact = |asked: &[Option<f64>], posture: usize| -> Vec<f64> {
+        asked.iter().zip(collider.grid.joints(posture)).map(|(a, own)| a.unwrap_or(own)).collect()
+    };
+    let first = postures[0];
+    let mut path = SearchPath {
+        states: vec![SearchState { pose: query.start, joints: exact(&query.start_joints, first) }],
+        moves: Vec::new(),
+        expanded,
+    };
+    path.then_to(SearchState { pose: query.start, joints: collider.grid.joints(first) }, SearchMove::Still);
+    let drive_reverse = reverse_of_pieces(&checked.route, pieces);
+    for (k, piece) in pieces.iter().enumerate() {
+        let kind = match drive_reverse[k] {
+            None => SearchMove::Still,
+            Some(false) => SearchMove::Forward,
+            Some(true) => SearchMove::Reverse,
+        };
+        path.then_to(SearchState { pose: piece.to, joints: collider.grid.joints(postures[k + 1]) }, kind);
+    }
+    let last = postures[postures.len() - 1];
+    let end = path.states[path.states.len() - 1].pose;
+    let yaw = query.goal_yaw.map_or(end.yaw, |yaw| end.yaw + wrap_angle(yaw - end.yaw));
+    let end = Pose2 { yaw, x: query.goal.x, y: query.goal.y };
+    path.states.last_mut().expect("never empty").pose = end;
+    path.then_to(SearchState { pose: end, joints: exact(&query.goal_joints, last) }, SearchMove::Still);
+    if path.moves.is_empty() {
+        let only = path.states[0].clone();
+        path.states.push(only);
+        path.moves.push(SearchMove::Still);
+    }
+    path
+}
+
+/// Per piece: `None` for a turn, else whether it backs up.
+fn reverse_of_pieces(route: &Route, pieces: &[BaseMotion]) -> Vec<Option<bool>> {
+    let mut drive = 0;
+    let mut out = Vec::with_capacity(pieces.len());
+    for piece in pieces {
+        let driving = piece.from.distance(piece.to) > 0.0;
+        // A drive of no length only keeps two turns apart.
+        while driving && route.corners[drive] == route.corners[drive + 1] {
+            drive += 1;
+        }
+        out.push(driving.then(|| route.reverse[drive]));
+        if driving && route.corners[drive + 1] == [piece.to.x, piece.to.y] {
+            drive += 1;
+        }
+    }
+    out
+}
+
+/// Posture steps that there is time for while the base goes through a piece.
+fn steps_in_time(robot: &RobotModel, grid: &PostureGrid, piece: &BaseMotion) -> usize {
+    let time = piece.from.distance(piece.to) / robot.base.speed
+        + (piece.to.yaw - piece.from.yaw).abs() / robot.base.angular_speed.max(1e-6);
+    let steps = robot.joints.iter().enumerate().map(|(m, joint)| {
+        let step = grid.step(m);
+        if step > 0.0 { 0.7 * joint.limits.planning()[0] * time / step } else { f64::INFINITY }
+    });
+    steps.fold(f64::INFINITY, f64::min).min(1024.0) as usize
+}
