@@ -3,7 +3,7 @@
 use super::Problem;
 
 /// Least and most cells, jumps apart.
-const CELLS: (f64, f64) = (48.0, 1000.0);
+const CELLS: (f64, f64) = (80.0, 1000.0);
 /// Samples of how long a stretch takes, in each stretch between two breaks.
 const SAMPLES: usize = 4;
 /// How near a break its one-sided limit is taken, as a share of the stretch.
