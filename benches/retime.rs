@@ -43,6 +43,11 @@ fn benches(c: &mut Criterion) {
         .collect();
     let options = RetimeOptions { law: TimeLaw::Auto, sampling_time: 0.1 };
     let sampling = SampleOptions { sampling_time: 0.1, sampling: Sampling::Mean };
+    for law in [TimeLaw::Optimal, TimeLaw::Wheel, TimeLaw::Eq5] {
+        let trajectory = given::from_bezier(&c_curve, &[]).expect("a smooth path");
+        let options = RetimeOptions { law, sampling_time: 0.1 };
+        c.bench_function(&format!("retime/c_curve/{law:?}"), |b| b.iter(|| retime(&trajectory, &robot, &options)));
+    }
     for (name, path) in [("c_curve", &c_curve), ("thirty_bends", &long)] {
         let trajectory = given::from_bezier(path, &[]).expect("a smooth path");
         let profile = retime(&trajectory, &robot, &options).expect("auto times every path");

@@ -84,8 +84,8 @@ mod tests {
             let mut dense = vec![vec![0.0; size]; size];
             let mut system = Pentadiagonal::default();
             system.reset(size);
-            for i in 0..size {
-                dense[i][i] += 1.0;
+            for (i, row) in dense.iter_mut().enumerate() {
+                row[i] += 1.0;
                 system.rows[i][0] += 1.0;
             }
             for first in 0..size - 2 {

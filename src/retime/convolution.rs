@@ -127,7 +127,9 @@ impl Convolution {
         let [t0, t1, t2] = self.boxes;
         let v = self.distance / t0;
         if t >= t1 + t2 {
-            return [0.5 * self.distance - v * (0.5 * (t0 + t1 + t2) - t), v, 0.0, 0.0];
+            // A cruise of no length is no cruise: the middle is in the midst of one stretch of jerk.
+            let j = if t2 > 0.0 && t0 <= (t1 + t2) * (1.0 + 1e-12) { -v / (t1 * t2) } else { 0.0 };
+            return [0.5 * self.distance - v * (0.5 * (t0 + t1 + t2) - t), v, 0.0, j];
         }
         // t < t1 + t2, so t1 > 0.
         let a = v / t1;

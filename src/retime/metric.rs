@@ -65,7 +65,7 @@ impl Metric {
         };
         let [u, middle, ..] = cell.at(0.5 * length);
         let [h, _] = rate(Place { piece, u: u.clamp(from, to) });
-        if depth < DEEPEST && !((middle * h - 1.0).abs() <= RATE) {
+        if depth < DEEPEST && (middle * h - 1.0).abs() > RATE {
             let half = 0.5 * (from + to);
             self.tabulate(piece, [from, half], rate, depth + 1);
             self.tabulate(piece, [half, to], rate, depth + 1);

@@ -53,8 +53,10 @@ impl Clock {
             Self::Metric(metric, c) => {
                 c.corners().into_iter().chain(metric.nodes().map(|length| c.time_at(length))).collect()
             }
-            // A pace has a corner wherever its reference has one that matters.
-            Self::Paced(_, pace) => pace.corners().collect(),
+            // Its own, and its reference's: not all of them are where cells join.
+            Self::Paced(reference, pace) => {
+                pace.corners().chain(reference.corners().into_iter().map(|t| pace.time_at(t))).collect()
+            }
         }
     }
 

@@ -17,8 +17,6 @@ use super::{Problem, STILL};
 const POINTS: [(f64, f64); 3] = [(0.0, 1.0 / 6.0), (0.5, 4.0 / 6.0), (1.0, 1.0 / 6.0)];
 /// Steps at most.
 const STEPS: usize = 80;
-/// It ends where the time is known to be within this share of the least (on the grid, as far as it is convex).
-const GAP: f64 = 2e-4;
 /// No constraint shrinks by more in a step.
 const TO_BOUNDARY: f64 = 0.01;
 /// A multiplier stays within this factor of what the constraint's value asks for.
@@ -29,10 +27,21 @@ const LEAST_CURVATURE: f64 = 0.05;
 const START_INSIDE: f64 = 0.6;
 
 /// The least time's b: p0, p1, p2 of each cell, in powers of the reference time since the cell's start.
-pub(super) fn solve(problem: &Problem<'_>, grid: &Grid) -> Option<Vec<[f64; 3]>> {
+///
+/// `near`: a b to start near; without one a guess is made.
+pub(super) fn solve(
+    problem: &Problem<'_>,
+    grid: &Grid,
+    gap: f64,
+    near: Option<&dyn Fn(f64) -> f64>,
+) -> Option<Vec<[f64; 3]>> {
     let mut barrier = Barrier::new(problem, grid);
-    let mut x = barrier.start(guess(problem, grid))?;
-    barrier.descend(&mut x);
+    let shape = match near {
+        Some(b) => (0..grid.cells() + 2).map(|i| b(grid.place(i))).collect(),
+        None => guess(problem, grid),
+    };
+    let mut x = barrier.start(shape)?;
+    barrier.descend(&mut x, gap);
     let cells = (0..grid.cells()).map(|cell| {
         let basis = grid.basis(cell);
         [0, 1, 2].map(|k| (0..3).map(|i| basis[k][i] * x[cell + i]).sum::<f64>())
@@ -167,8 +176,8 @@ impl Barrier {
         self.caps.len() + self.signs.len() + 2 * (self.acceleration.len() + self.jerk.len())
     }
 
-    /// Newton steps until the gap is closed, or none helps.
-    fn descend(&mut self, x: &mut Vec<f64>) {
+    /// Newton steps until the time is known to be within a share `gap` of the least (on the grid, as far as it is convex), or none helps.
+    fn descend(&mut self, x: &mut Vec<f64>, gap: f64) {
         let mut mu = 0.1 * self.time(x) / self.constraints() as f64;
         let mut step = vec![0.0; x.len()];
         let mut next = x.clone();
@@ -201,7 +210,7 @@ impl Barrier {
             let Some(found) = found else { return };
             std::mem::swap(x, &mut next);
             value = found;
-            if share > 0.5 && self.constraints() as f64 * mu <= GAP * value.time {
+            if share > 0.5 && self.constraints() as f64 * mu <= gap * value.time {
                 return;
             }
             mu = after;
@@ -211,10 +220,12 @@ impl Barrier {
     /// Newton's system at some unknowns: fills the Hessian and the downhill gradient of the barrier function with weight `mu`, and the
     /// slacks. `fresh`: multipliers are put on the central path; otherwise they are kept near it. `None`: a limit is broken.
     fn assemble(&mut self, x: &[f64], mu: f64, fresh: bool, gradient: &mut [f64]) -> Option<Value> {
-        let keep = |on: &mut f64, slack: f64| {
-            let central = mu / slack;
-            *on = if fresh { central } else { on.clamp(central / CENTRED, central * CENTRED) };
-            *on
+        // Returns the multiplier over the slack: what the constraint adds to the Hessian.
+        let keep = |constraint: &mut Constraint, inverse: f64| {
+            let central = mu * inverse;
+            let on = if fresh { central } else { constraint.on.clamp(central / CENTRED, central * CENTRED) };
+            *constraint = Constraint { inverse, on };
+            on * inverse
         };
         let mut value = Value::default();
         self.hessian.reset(x.len());
@@ -222,9 +233,9 @@ impl Barrier {
             if x[i] <= 0.0 {
                 return None;
             }
-            sign.slack = x[i];
-            self.hessian.rows[i][0] = keep(&mut sign.on, x[i]) / x[i];
-            gradient[i] = mu / x[i];
+            let inverse = 1.0 / x[i];
+            self.hessian.rows[i][0] = keep(sign, inverse);
+            gradient[i] = mu * inverse;
             value.logs += x[i].ln();
         }
         for (i, point) in self.points.iter().enumerate() {
@@ -232,26 +243,24 @@ impl Barrier {
             let [b, b1, b2] = point.values(x, cell);
             let root = b.sqrt();
             let r = 1.0 / root;
-            let (r1, r2) = (-0.5 * r / b, 0.75 * r / (b * b));
+            let r3 = r * r * r;
+            let (r1, r2) = (-0.5 * r3, 0.75 * r3 * r * r);
             let cap = point.cap - b;
             let mut least = cap;
             let mut product = cap;
             value.time += point.weight * r;
             // Gradient of the barrier function and Hessian in (b, b1, b2).
-            let on = &mut self.caps[i];
-            on.slack = cap;
-            let mut g = [point.weight * r1 + mu / cap, 0.0, 0.0];
-            let mut h = [keep(&mut on.on, cap) / cap, 0.0, 0.0, 0.0, 0.0, 0.0];
+            let inverse = 1.0 / cap;
+            let mut g = [point.weight * r1 + mu * inverse, 0.0, 0.0];
+            let mut h = [keep(&mut self.caps[i], inverse), 0.0, 0.0, 0.0, 0.0, 0.0];
             let rows = i * self.accelerations..(i + 1) * self.accelerations;
             for ([a0, a1], on) in self.acceleration[rows.clone()].iter().zip(&mut self.on_acceleration[rows]) {
                 let l = a0 * b + a1 * b1;
                 let slack = [1.0 - l, 1.0 + l];
                 least = least.min(slack[0]).min(slack[1]);
                 product *= slack[0] * slack[1];
-                [on[0].slack, on[1].slack] = slack;
                 let c = slack.map(f64::recip);
-                let (low, high) = (keep(&mut on[0].on, slack[0]), keep(&mut on[1].on, slack[1]));
-                let (force, stiff) = (mu * (c[0] - c[1]), low * c[0] + high * c[1]);
+                let (force, stiff) = (mu * (c[0] - c[1]), keep(&mut on[0], c[0]) + keep(&mut on[1], c[1]));
                 g[0] += force * a0;
                 g[1] += force * a1;
                 h[0] += stiff * a0 * a0;
@@ -266,16 +275,14 @@ impl Barrier {
                 let slack = [room - l, room + l];
                 least = least.min(slack[0]).min(slack[1]);
                 product *= slack[0] * slack[1];
-                [on[0].slack, on[1].slack] = slack;
                 let c = slack.map(f64::recip);
-                let (low, high) = (keep(&mut on[0].on, slack[0]), keep(&mut on[1].on, slack[1]));
+                let (low, high) = (keep(&mut on[0], c[0]), keep(&mut on[1], c[1]));
                 let d = r1 - 0.5 * k * r;
-                curvature -= (low + high) * (r2 + 0.25 * k * r / b);
+                curvature -= (on[0].on + on[1].on) * (r2 + 0.25 * k * r3);
                 let (sum, difference) = (mu * (c[0] + c[1]), mu * (c[0] - c[1]));
                 g[0] += difference * j0 - sum * d;
                 g[1] += difference * j1;
                 g[2] += difference * j2;
-                let (low, high) = (low * c[0], high * c[1]);
                 let (sum, difference) = (low + high, low - high);
                 h[0] += sum * (d * d + j0 * j0) - 2.0 * difference * d * j0;
                 h[1] += (sum * j0 - difference * d) * j1;
@@ -315,9 +322,8 @@ impl Barrier {
     fn reach(&mut self, x: &[f64], step: &[f64], mu: f64) -> f64 {
         let mut fastest = 1.0 - TO_BOUNDARY;
         let mut follow = |on: &mut Constraint, change: f64| {
-            let inverse = 1.0 / on.slack;
-            fastest = fastest.max(-change * inverse);
-            on.on = (mu - on.on * change) * inverse;
+            fastest = fastest.max(-change * on.inverse);
+            on.on = (mu - on.on * change) * on.inverse;
         };
         for (sign, step) in self.signs.iter_mut().zip(step) {
             follow(sign, *step);
@@ -337,7 +343,7 @@ impl Barrier {
             let rows = i * self.jerks..(i + 1) * self.jerks;
             for ([j0, j1, j2, k], [low, high]) in self.jerk[rows.clone()].iter().zip(&mut self.on_jerk[rows]) {
                 let change = j0 * by[0] + j1 * by[1] + j2 * by[2];
-                let room = -0.5 * (r / b + k * r) * by[0];
+                let room = -0.5 * (r * r * r + k * r) * by[0];
                 follow(low, room - change);
                 follow(high, room + change);
             }
@@ -346,10 +352,10 @@ impl Barrier {
     }
 }
 
-/// A constraint's slack at the current unknowns, and its multiplier.
+/// A constraint at the current unknowns: what is left of it, inverted, and its multiplier.
 #[derive(Debug, Clone, Copy, Default)]
 struct Constraint {
-    slack: f64,
+    inverse: f64,
     on: f64,
 }
 

@@ -3,7 +3,7 @@
 use super::Problem;
 
 /// Least and most cells, jumps apart.
-const CELLS: (f64, f64) = (48.0, 1000.0);
+const CELLS: (f64, f64) = (80.0, 1000.0);
 /// Samples of how long a stretch takes, in each stretch between two breaks.
 const SAMPLES: usize = 4;
 /// How near a break its one-sided limit is taken, as a share of the stretch.
@@ -44,12 +44,13 @@ struct Stretch {
 }
 
 impl Grid {
-    /// Cells of about equal duration, and knots where the rows jump.
-    pub fn new(problem: &Problem<'_>, rates: &mut impl FnMut(f64, &mut Vec<[f64; 3]>)) -> Option<Self> {
+    /// Cells of about equal duration, and knots where the rows jump. `coarse`: by how much longer than asked for they are, and by how much
+    /// less even the rows may be in them.
+    pub fn new(problem: &Problem<'_>, coarse: f64, rates: &mut impl FnMut(f64, &mut Vec<[f64; 3]>)) -> Option<Self> {
         let stretches = stretches(problem, rates)?;
         let least: f64 =
             stretches.iter().map(|s| (s.to - s.from) * s.slowness.iter().sum::<f64>() / SAMPLES as f64).sum();
-        let cells = (least / problem.step).clamp(CELLS.0, CELLS.1);
+        let cells = (least / problem.step).clamp(CELLS.0, CELLS.1) / coarse;
         let slowness = graded(&stretches, cells / least);
         // Least time up to each sample's end.
         let width = |i: usize| (stretches[i / SAMPLES].to - stretches[i / SAMPLES].from) / SAMPLES as f64;
@@ -104,13 +105,13 @@ impl Grid {
         knots.push(end);
         knot_jumps.push(Vec::new());
         knot_slowness.push(*slowness.last()?);
-        let coarse = Self { rates: Vec::new(), jumps: knot_jumps, slowness: knot_slowness, knots };
-        let fine = coarse.halved(problem, rates);
+        let even = Self { rates: Vec::new(), jumps: knot_jumps, slowness: knot_slowness, knots };
+        let fine = even.halved(problem, UNEVEN * coarse * coarse, rates);
         fine.rates.iter().flatten().all(|rate| rate.is_finite()).then_some(fine)
     }
 
-    /// With rates, and cells halved where the rows are too uneven for them.
-    fn halved(self, problem: &Problem<'_>, rates: &mut impl FnMut(f64, &mut Vec<[f64; 3]>)) -> Self {
+    /// With rates, and cells halved where a row is more uneven than `most`.
+    fn halved(self, problem: &Problem<'_>, most: f64, rates: &mut impl FnMut(f64, &mut Vec<[f64; 3]>)) -> Self {
         let rows = problem.limits.len();
         let mut fine = Self { knots: Vec::new(), rates: Vec::new(), jumps: Vec::new(), slowness: Vec::new() };
         fine.rates.reserve(3 * rows * self.cells());
@@ -132,7 +133,7 @@ impl Grid {
                 let uneven = (0..rows).any(|row| {
                     (1..3).any(|k| {
                         let off = at(1, row)[k] - 0.5 * (at(0, row)[k] + at(2, row)[k]);
-                        off.abs() > UNEVEN * problem.limits[row][k] * slowness.powi(k as i32 + 1)
+                        off.abs() > most * problem.limits[row][k] * slowness.powi(k as i32 + 1)
                     })
                 });
                 if uneven && end - start > least {
@@ -156,6 +157,15 @@ impl Grid {
     /// Number of cells.
     pub fn cells(&self) -> usize {
         self.knots.len() - 1
+    }
+
+    /// Where an unknown has its say: the ends, and the middle of every cell.
+    pub fn place(&self, unknown: usize) -> f64 {
+        match unknown {
+            0 => self.knots[0],
+            i if i > self.cells() => self.knots[self.cells()],
+            i => 0.5 * (self.knots[i - 1] + self.knots[i]),
+        }
     }
 
     /// The polynomial p0 + p1 s + p2 s^2 of a cell (s since its start) as three weights each of the unknowns `cell`, `cell + 1`,

@@ -9,12 +9,7 @@ use super::{Problem, STILL};
 /// rounded as jerks allow. Weights of the B-splines; positive, but not scaled to the limits.
 pub(super) fn guess(problem: &Problem<'_>, grid: &Grid) -> Vec<f64> {
     let (rows, count) = (problem.limits.len(), grid.cells() + 2);
-    // At the unknowns' own places: the ends, and the middle of every cell.
-    let place = |i: usize| match i {
-        0 => grid.knots[0],
-        i if i > grid.cells() => grid.knots[grid.cells()],
-        i => 0.5 * (grid.knots[i - 1] + grid.knots[i]),
-    };
+    let place = |i: usize| grid.place(i);
     let cell = |i: usize| i.clamp(1, grid.cells()) - 1;
     // The rows' speeds as shares of a limit (of accelerations, of jerks) in the cell's middle.
     let share = |i: usize, order: usize| {

@@ -58,10 +58,12 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(48) })]
     #[test]
     fn a_line_takes_the_convolution_profiles_time(
-        distance in prop_oneof![1e-6..1e-3f64, 1e-3..10.0f64, 10.0..1e3f64],
-        v in 0.1..2.0f64, a in 0.1..2.0f64, j in 0.1..5.0f64,
-        shares in [0.3..1.0f64, 0.3..1.0f64, 0.3..1.0f64],
+        reach in prop_oneof![1e-9..1e-3f64, 1e-3..1.0f64, 1.0..10.0f64], fast in 0.3..10.0f64,
+        a in 1e-3..1e3f64, j in 1e-3..1e3f64, shares in [0.3..1.0f64, 0.3..1.0f64, 0.3..1.0f64],
     ) {
+        // Speeds in units of what builds up while the acceleration does; lengths in those of speeding up and braking.
+        let v = fast * a * a / j;
+        let distance = reach * v * (v / a + a / j);
         let (time, largest) = line(distance, [v, a, j], shares);
         let least = Convolution::fastest(distance, [v, a, j]).duration();
         let legal = time * largest;
@@ -77,7 +79,8 @@ proptest! {
         let mut more = limits;
         more[which] *= 1.3;
         let (after, _) = bend(distance, sway, more, false);
-        prop_assert!(after < before * (1.0 + 2e-3), "{before} s, {after} s");
+        // A law's b'' is constant in each cell, so it loses in proportion to the cells' length, which the limits choose.
+        prop_assert!(after < before * (1.0 + 5e-3), "{before} s, {after} s");
     }
 
     #[test]
