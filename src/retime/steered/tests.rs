@@ -79,13 +79,15 @@ fn is_one_motion(profile: &MotionProfile, track: f64) {
 }
 
 #[test]
-fn spins_cusps_and_stops_are_timed_by_the_legs_own_seconds_within_every_limit() {
+fn spins_cusps_and_stops_are_timed_within_every_limit() {
     let robot = fixtures::scr_db();
-    for law in [TimeLaw::Minco, TimeLaw::Auto] {
+    let mut times = Vec::new();
+    for (law, name) in [(TimeLaw::Minco, "minco"), (TimeLaw::Auto, "optimal")] {
         let profile = timed(&all_kinds(), law).unwrap();
         limits_hold(&profile, &robot);
         is_one_motion(&profile, robot.track_width);
-        assert!(profile.unrounded_time() >= 15.0 && profile.law_name().contains("minco"));
+        assert!(profile.law_name().contains(name), "{}", profile.law_name());
+        times.push(profile.unrounded_time());
         for t in [0.0, profile.time()] {
             let state = profile.at(t);
             state.wheels.iter().chain(&state.joints).for_each(|jet| assert!(jet[1].abs() < 1e-12, "{jet:?}"));
@@ -93,6 +95,8 @@ fn spins_cusps_and_stops_are_timed_by_the_legs_own_seconds_within_every_limit() 
         let end = profile.at(profile.time());
         assert!((end.pose.yaw - 1.1).abs() < 1e-12 && (end.joints[0][0] - 1.2).abs() < 1e-12);
     }
+    // The leg's own seconds, which are 15 and slowed down; the least time is less.
+    assert!(times[0] >= 15.0 && times[1] < times[0], "{times:?}");
 }
 
 #[test]
@@ -139,7 +143,7 @@ fn laws_of_the_distance_drive_a_leg_that_stands_nowhere_and_refuse_one_that_does
     }
     let times = [TimeLaw::Auto, TimeLaw::Minco, TimeLaw::Eq5, TimeLaw::FixedPoint]
         .map(|law| timed(&bend(), law).unwrap().unrounded_time());
-    assert_eq!(times[0], times[1..].iter().copied().fold(f64::INFINITY, f64::min), "{times:?}");
+    assert!(times[1..].iter().all(|time| times[0] <= *time), "{times:?}");
 }
 
 #[test]
