@@ -93,7 +93,7 @@ fn commands(robot: &RobotModel) -> (CommandTable, Task) {
         angle += rate * table.sampling_time;
     }
     let goal = Goal { x: pose.x, y: pose.y, yaw: Some(pose.yaw), joints: vec![None] };
-    (table, Task { start, start_joints: vec![0.0], goal, clearance: 0.05 })
+    (table, Task { start, start_joints: vec![0.0], goal, clearance: 0.05, reverse: false })
 }
 
 /// Obstacles wherever the drive leaves room: `density` of the cells that are at least `room` metres from the base's path.

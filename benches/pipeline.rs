@@ -81,6 +81,7 @@ impl Bench {
             start_joints: first.joints.clone(),
             goal: Goal { x: goal.x, y: goal.y, yaw: Some(goal.yaw), joints },
             clearance: self.mission.clearance,
+            reverse: self.mission.reverse,
         };
         certify::certify(table, self.robot(), Some(self.map()), &task)
     }

@@ -286,7 +286,7 @@ impl Finish<'_> {
         let (start, start_joints) = start_of(trajectory);
         let given_end = self.mission.path.as_ref().map(|_| end_of(trajectory));
         let goal = goal(self.mission, self.robot, given_end);
-        Task { start, start_joints, goal, clearance: self.mission.clearance }
+        Task { start, start_joints, goal, clearance: self.mission.clearance, reverse: self.mission.reverse }
     }
 
     fn path_errors(

@@ -141,7 +141,7 @@ fn brute_force(robot: &RobotModel, stretch: &Stretch, cube: &Aabb, enough: f64) 
 fn proof(compiled: &Compiled, stretch: &Stretch, map: &VoxelMap, clearance: f64) -> Certificate {
     let (start, start_joints) = stretch.states[0].clone();
     let goal = Goal { x: start.x, y: start.y, yaw: None, joints: vec![None; start_joints.len()] };
-    certify(&stretch.table, &compiled.robot, Some(map), &Task { start, start_joints, goal, clearance })
+    certify(&stretch.table, &compiled.robot, Some(map), &Task { start, start_joints, goal, clearance, reverse: false })
 }
 
 fn refuses(certificate: &Certificate) -> bool {

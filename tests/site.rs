@@ -50,7 +50,7 @@ fn under_the_tape(robot: &RobotModel, blade: f64) -> (CommandTable, Task) {
         rows,
     };
     let goal = Goal { x: pose.x, y: pose.y, yaw: Some(pose.yaw), joints: vec![Some(blade)] };
-    (table, Task { start, start_joints: vec![blade], goal, clearance: CLEARANCE })
+    (table, Task { start, start_joints: vec![blade], goal, clearance: CLEARANCE, reverse: false })
 }
 
 fn judged(world: &World, blade: f64) -> Certificate {

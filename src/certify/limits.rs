@@ -5,6 +5,8 @@ use super::{LimitCheck, Refusal, RefusalKind, within};
 use crate::command::CommandTable;
 use crate::robot::{MotionLimits, RobotModel};
 
+/// Slower than this is not driving backwards, m/s.
+const BACKWARDS: f64 = 1e-6;
 /// Limits hold up to this factor above 1: rounding only.
 const RELATIVE: f64 = 1e-9;
 /// Joint positions hold up to this, rad or m: rounding only.
@@ -67,6 +69,15 @@ fn peaks(speeds: &[f64], step: f64) -> [Peak; 3] {
         largest(&|k| (at(k, 0) - at(k, 1)) / step),
         largest(&|k| (at(k, 0) - 2.0 * at(k, 1) + at(k, 2)) / (step * step)),
     ]
+}
+
+/// A refusal where the base drives backwards, by more than rounding in written digits (1 um/s).
+pub(super) fn backwards(table: &CommandTable, rollout: &Rollout<'_>) -> Option<Refusal> {
+    let speeds = (0..table.rows.len()).map(|row| (row, table.twist(row).0));
+    let (row, speed) = speeds.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, speed)| *speed < -BACKWARDS)?;
+    let time = rollout.time(row, 0.0);
+    let message = format!("drives backwards at {:.6} m/s at t = {time:.3} s, which the mission does not allow", -speed);
+    Some(Refusal { kind: RefusalKind::Reverse, message, time: Some(time) })
 }
 
 /// A refusal for each joint that leaves its range. Joints move straight from row to row, so rows suffice.

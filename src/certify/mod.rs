@@ -36,6 +36,8 @@ pub struct Task {
     pub goal: Goal,
     /// Clearance to prove, m; has no meaning without a map.
     pub clearance: f64,
+    /// Whether the base may drive backwards.
+    pub reverse: bool,
 }
 
 /// Where a motion must end; `None`: anywhere will do.
@@ -100,6 +102,8 @@ pub enum RefusalKind {
     Limit,
     /// Joint position.
     Position,
+    /// Drives backwards where it may not.
+    Reverse,
     /// Does not end at the goal, or not at rest.
     End,
     /// The table contradicts itself or is not finite.
@@ -163,6 +167,10 @@ pub fn certify(table: &CommandTable, robot: &RobotModel, map: Option<&VoxelMap>,
     certificate.limits = limits;
     certificate.limits_hold = over.is_empty() && outside.is_empty();
     certificate.refusals.extend(over.into_iter().chain(outside));
+
+    if !task.reverse {
+        certificate.refusals.extend(limits::backwards(table, &rollout));
+    }
 
     let ends = ends::ends(&rollout, robot, &task.goal);
     certificate.end_point_error = ends.point;

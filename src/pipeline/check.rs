@@ -43,7 +43,7 @@ pub fn check(inputs: &mut Inputs, table: &CommandTable) -> Result<Certificate, D
     let start_joints =
         start_joints.map(|(j, own)| asked.and_then(|p| p.joints.get(&j.name).copied()).unwrap_or(*own)).collect();
     let goal = goal(mission, &robot, given.as_ref().map(end_of));
-    let task = Task { start, start_joints, goal, clearance: mission.clearance };
+    let task = Task { start, start_joints, goal, clearance: mission.clearance, reverse: mission.reverse };
     Ok(certify::certify(table, &robot, map.as_ref(), &task))
 }
 

@@ -76,6 +76,7 @@ fn refusal_kind(kind: RefusalKind) -> &'static str {
         RefusalKind::Clearance => "clearance",
         RefusalKind::Limit => "limit",
         RefusalKind::Position => "position",
+        RefusalKind::Reverse => "reverse",
         RefusalKind::End => "end",
         RefusalKind::Table => "table",
     }

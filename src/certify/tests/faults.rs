@@ -105,6 +105,18 @@ fn a_joint_outside_its_range_is_refused() {
 }
 
 #[test]
+fn driving_backwards_is_refused_unless_it_is_allowed() {
+    let (robot, mut table, mut task) = case();
+    for row in &mut table.rows {
+        (row.wheel_left, row.wheel_right) = (-row.wheel_left, -row.wheel_right);
+    }
+    let backwards = |task: &Task| kinds(&certify(&table, &robot, None, task)).contains(&RefusalKind::Reverse);
+    assert!(backwards(&task));
+    task.reverse = true;
+    assert!(!backwards(&task));
+}
+
+#[test]
 fn ends_beyond_the_tolerance_are_refused() {
     let (robot, table, task) = case();
     for (scale, expected) in [(0.999, vec![]), (1.001, vec![RefusalKind::End])] {

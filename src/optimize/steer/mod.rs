@@ -15,19 +15,19 @@ use super::penalty::Limits;
 use super::penalty::clearance::{ClearancePenalty, DistanceField};
 use crate::math::poly::{Piece, PiecewisePoly};
 use crate::robot::RobotModel;
-use crate::search::SearchPath;
+use crate::search::{SearchMove, SearchPath};
 use crate::trajectory::{Ending, Leg, OptimiserOutcome, SteerLeg, StillLeg, Trajectory, TrajectorySource};
 
 use guess::guess;
 use layout::Layout;
 use problem::{Problem, Weights};
-use solver::{SolverOptions, solve};
+use solver::{Solved, SolverOptions, solve};
 
 /// How to optimise heading and arc length.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SteerOptions {
     /// Weight of the jerk (squared, relative to the wheels' and joints' jerk limits) against time; larger is smoother, and slower in
-    /// the optimiser's own timing. Default 130: a mean jerk as small as \[SCR\]'s at its limits. The time law makes up for nearly
+    /// the optimiser's own timing. Default 170: a mean jerk as small as \[SCR\]'s at its limits. The time law makes up for nearly
     /// all of it.
     pub smoothness: f64,
     /// Weight of a limit overstepped by 100 % for 1 s, s. Default 30.
@@ -48,7 +48,7 @@ pub struct SteerOptions {
 impl Default for SteerOptions {
     fn default() -> Self {
         Self {
-            smoothness: 130.0,
+            smoothness: 170.0,
             motion_weight: 30.0,
             clearance_weight: 200.0,
             sample_distance: 0.15,
@@ -59,6 +59,12 @@ impl Default for SteerOptions {
     }
 }
 
+/// Backing up by less than this is rounding, m/s.
+const BACKING: f64 = 1e-9;
+/// Least speed that is asked of a motion that only drives forwards, as a share of the speed limit: what the penalty is soft by.
+const FLOOR: f64 = 0.02;
+/// How often a motion that backs up is made again with a higher floor under its speed.
+const BACKING_ROUNDS: usize = 4;
 /// Largest gap that is left between pieces, m: the end point may be off by a few of them.
 const GAP_TOLERANCE: f64 = 1e-7;
 
@@ -97,7 +103,23 @@ pub fn optimize_steered<F: DistanceField>(
     let mut x = first.x;
     let solver =
         SolverOptions { max_iterations: own.max_iterations, tolerance: own.tolerance, gap_tolerance: GAP_TOLERANCE };
-    let solved = solve(&mut problem, &mut x, &solver);
+    let forwards = path.moves.iter().all(|step| *step != SearchMove::Reverse);
+    if forwards {
+        problem.floors.fill(FLOOR * limits.speed);
+    }
+    let mut solved = solve(&mut problem, &mut x, &solver);
+    // The penalty is soft. A path that only drives forwards must not be left to back up, be it by a millimetre.
+    for _ in 0..if forwards { BACKING_ROUNDS } else { 0 } {
+        let backing = problem.backing_up(&x);
+        if backing.iter().all(|back| *back <= BACKING) {
+            break;
+        }
+        for (floor, back) in problem.floors.iter_mut().zip(&backing) {
+            *floor += if *back > BACKING { 2.0 * back + 1e-3 * limits.speed } else { 0.0 };
+        }
+        let again = solve(&mut problem, &mut x, &solver);
+        solved = Solved { iterations: solved.iterations + again.iterations, ..again };
+    }
     let leg = SteerLeg { pose: path.states[0].pose, curve: curve(layout, &x) };
     let ending = if solved.converged { Ending::Converged } else { Ending::IterationLimit };
     let outcome = OptimiserOutcome { pieces: layout.pieces, iterations: solved.iterations, ending, cost: solved.cost };

@@ -32,8 +32,13 @@ pub(super) struct Weights {
 
 /// How stiffly a step of the model closes the gaps: all but exactly, s/m^2.
 pub(super) const STIFFNESS: f64 = 1e6;
+/// Backing up weighs as much as exceeding the speed limit by so many times as much.
+const BACKWARDS: f64 = 10.0;
 /// Shortest piece, s.
 const SHORTEST: f64 = 0.04;
+
+/// How often a finished piece is looked at.
+const LOOKS: usize = 64;
 
 /// Samples of a piece.
 struct Table {
@@ -76,6 +81,8 @@ pub(super) struct Problem<'a, F> {
     /// +1 or -1 a piece: which way its base drives.
     directions: Vec<f64>,
     pub fixed: Vec<bool>,
+    /// Least speed along its direction that is asked of each piece, m/s.
+    pub floors: Vec<f64>,
     pub weights: Weights,
     /// What a jerk of each dimension is measured in.
     jerk_scales: Vec<f64>,
@@ -159,6 +166,7 @@ impl<'a, F: DistanceField> Problem<'a, F> {
             limits,
             clearance,
             layout,
+            floors: vec![0.0; directions.len()],
             directions,
             fixed,
             weights,
@@ -200,6 +208,20 @@ impl<'a, F: DistanceField> Problem<'a, F> {
             }
         }
         natural
+    }
+
+    /// By how much a motion backs up at worst in each piece, m/s; 0 where it does not.
+    pub fn backing_up(&self, x: &[f64]) -> Vec<f64> {
+        let layout = self.layout;
+        let dense = Table::new(LOOKS);
+        (0..layout.pieces)
+            .map(|piece| {
+                let time = x[layout.duration(piece)].exp();
+                let data = layout.data(piece, ARC, x, time);
+                let speeds = dense.bases.iter().map(|basis| self.directions[piece] * basis.at(&data)[1] / time);
+                -speeds.fold(0.0, f64::min)
+            })
+            .collect()
     }
 
     /// Cost at `x` without the gaps, which have these multipliers; fills `out`.
@@ -259,7 +281,8 @@ impl<'a, F: DistanceField> Problem<'a, F> {
             let heading = basis.at(&self.data[HEADING]);
             let arc = basis.at(&self.data[ARC]);
             path.advance(&basis, &heading, &arc);
-            cost += self.base_limits(piece, &basis, &heading, &arc, &rates, weight * self.weights.motion);
+            let rest = (piece == 0 && sample == 0) || (piece + 1 == layout.pieces && sample == count);
+            cost += self.base_limits(piece, rest, &basis, &heading, &arc, &rates, weight * self.weights.motion);
             cost += self.joint_limits(&basis, &rates, weight * self.weights.motion);
             cost += self.clearance_at([piece, sample, first + sample], &basis, &path, start, weight);
         }
@@ -304,10 +327,13 @@ impl<'a, F: DistanceField> Problem<'a, F> {
         cost
     }
 
-    /// Limits of base and wheels: each is linear in one derivative of heading and arc length.
+    /// Limits of base and wheels: each is linear in one derivative of heading and arc length. At rest the speed is what it is, and
+    /// the jerk must not point backwards.
+    #[allow(clippy::too_many_arguments)]
     fn base_limits(
         &mut self,
         piece: usize,
+        rest: bool,
         basis: &Basis,
         heading: &[f64; 4],
         arc: &[f64; 4],
@@ -333,8 +359,15 @@ impl<'a, F: DistanceField> Problem<'a, F> {
         if speed > 0.0 {
             row(1, [0.0, direction / limits.speed], speed, 1.0);
         }
-        if along < 0.0 {
-            row(1, [0.0, -direction / limits.speed], -along / limits.speed, 0.0);
+        let floor = self.floors[piece];
+        if along < floor && !rest {
+            // As if it were by so many limits: there is nothing to gain from it.
+            let unit = limits.speed / BACKWARDS;
+            row(1, [0.0, -direction / unit], (floor - along) / unit, -floor / unit);
+        }
+        let push = direction * arc[3] * rates[3] / self.rim_jerk;
+        if push < 0.0 && rest {
+            row(3, [0.0, -direction / self.rim_jerk], -push, 0.0);
         }
         let at_rest = limits.turn_slope * limits.speed;
         let eq14 = over(side * turn + limits.turn_slope * along, at_rest);
