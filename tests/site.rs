@@ -12,6 +12,8 @@ use trajc::robot::RobotModel;
 /// Lower faces of the tapes above the floor, m; and the line along y on which the first hangs.
 const TAPES: [f64; 2] = [0.45, 0.40];
 const FIRST_TAPE: [f64; 2] = [2.60, 2.65];
+/// The line along x on which the second hangs, above y = 4.6 m.
+const SECOND_TAPE: [f64; 2] = [3.0, 3.05];
 /// Clearance that is asked for, m.
 const CLEARANCE: f64 = 0.03;
 
@@ -122,8 +124,26 @@ fn the_site_is_crossed_with_the_blades_in_between_the_boxes_and_down_below_the_t
     };
     let narrow = extent(&|p| (1.25..1.75).contains(&p.y));
     assert!(narrow[0] > 0.0 && 2.0 * narrow[0] < 0.5, "between boxes 0.5 m apart: {narrow:?}");
-    let below = extent(&|p| (FIRST_TAPE[0]..FIRST_TAPE[1]).contains(&p.y));
-    assert!(below[1] > 0.0 && below[1] < TAPES[0] - CLEARANCE, "below the first tape: {below:?}");
-    let second = extent(&|p| p.y > 4.6 && (3.0..3.05).contains(&p.x));
-    assert!(second[1] > 0.0 && second[1] < TAPES[1] - CLEARANCE, "below the second tape: {second:?}");
+    // The highest point of the robot's boxes, of a fine grid in each, that is below a tape.
+    let below = |axis: usize, tape: [f64; 2], here: &dyn Fn(&Point3<f64>) -> bool| {
+        let mut highest = 0.0f64;
+        for (pose, row) in poses.iter().zip(&table.rows) {
+            for (shape, at) in world.robot.shapes.iter().zip(world.robot.shape_poses(&row.joint_positions)) {
+                let trajc::robot::Convex::Box { half } = shape.convex else { continue };
+                let steps = |k: usize, n: usize| 2.0 * k as f64 / n as f64 - 1.0;
+                for (i, j, k) in (0..3 * 9 * 41).map(|n| (n % 3, n / 3 % 9, n / 27)) {
+                    let local = Vector3::new(half[0] * steps(j, 8), half[1] * steps(i, 2), half[2] * steps(k, 40));
+                    let p = pose.isometry() * at * Point3::from(local);
+                    if (tape[0]..tape[1]).contains(&p[axis]) && here(&p) {
+                        highest = highest.max(p.z);
+                    }
+                }
+            }
+        }
+        highest
+    };
+    let first = below(1, FIRST_TAPE, &|_| true);
+    assert!(first > 0.0 && first < TAPES[0] - CLEARANCE, "below the first tape: {first}");
+    let second = below(0, SECOND_TAPE, &|p| p.y > 4.6);
+    assert!(second > 0.0 && second < TAPES[1] - CLEARANCE, "below the second tape: {second}");
 }

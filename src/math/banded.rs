@@ -147,14 +147,14 @@ mod tests {
             let wanted = &entries[100..100 + size];
             let mut product = vec![0.0; size];
             matrix.multiply(wanted, &mut product);
-            for i in 0..size {
+            for (i, value) in product.iter().enumerate() {
                 let direct: f64 = (0..size).map(|j| full(i, j) * wanted[j]).sum();
-                prop_assert!((product[i] - direct).abs() < 1e-12);
+                prop_assert!((value - direct).abs() < 1e-12);
             }
             prop_assert!(matrix.factor());
             matrix.solve(&mut product);
-            for i in 0..size {
-                prop_assert!((product[i] - wanted[i]).abs() < 1e-6, "{product:?} {wanted:?}");
+            for (found, wanted) in product.iter().zip(wanted) {
+                prop_assert!((found - wanted).abs() < 1e-6, "{found} {wanted}");
             }
         }
     }

@@ -108,7 +108,7 @@ pub(crate) fn commands(
         yaw: Some(last.pose.yaw),
         joints: last.joint_positions.iter().map(|q| Some(*q)).collect(),
     };
-    let task = Task { start, start_joints: joints.to_vec(), goal, clearance: 0.05, reverse: false };
+    let task = Task { start, start_joints: joints.to_vec(), goal, clearance: 0.05, reverse: true };
     (table, task)
 }
 
