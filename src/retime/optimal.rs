@@ -5,9 +5,9 @@
 //!
 //! `dq/dtau = q' sqrt(b)`, `d2q/dtau2 = q'' b + q' b'/2`, `d3q/dtau3 = sqrt(b) (q''' b + 3/2 q'' b' + q' b''/2)`,
 //!
-//! so speed is a cap on b, acceleration is linear in b, and only the jerk is not convex. With b a quadratic B-spline ([`grid`]) the
+//! so speed is a cap on b, acceleration is linear in b, and only the jerk is not convex. With b a quadratic B-spline (`grid`) the
 //! acceleration is continuous and the jerk bounded. The time, the integral of dt/sqrt(b), falls from a feasible start by an
-//! interior-point method ([`barrier`]) that never leaves the limits: O(cells) a step. [`Pace`] is tau as a function, exactly.
+//! interior-point method (`barrier`) that never leaves the limits: O(cells) a step. [`Pace`] is tau as a function, exactly.
 //!
 //! Knows nothing of wheels, courses or robots: rows, limits and breaks.
 
