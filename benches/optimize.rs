@@ -1,8 +1,10 @@
-//! Speed of `optimize`: one MINCO solve with its gradient, and a whole path of about 10 m with six corners between boxes.
+//! Speed of `optimize`: one MINCO solve with its gradient, and a whole path of about 10 m with four corners between boxes, in both
+//! parameterisations.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::Isometry3;
 use trajc::geom::Pose2;
+use trajc::mission::Parameterisation;
 use trajc::optimize::minco::Minco;
 use trajc::optimize::{DistanceField, OptimizeOptions, optimize_in};
 use trajc::robot::{BaseLimits, Body, Convex, MotionLimits, RobotModel, Shape};
@@ -95,7 +97,7 @@ fn benches(criterion: &mut Criterion) {
         });
     });
 
-    let (robot, options) = (robot(), OptimizeOptions::default());
+    let robot = robot();
     let path = path(&[
         (0.5, 0.0),
         (0.0, 1.8),
@@ -120,9 +122,11 @@ fn benches(criterion: &mut Criterion) {
             })
             .collect(),
     );
-    criterion.bench_function("optimize: 10 m, four corners between boxes", |b| {
-        b.iter(|| optimize_in(&path, &field, &robot, &options));
-    });
+    for parameterisation in [Parameterisation::Flat, Parameterisation::ArcLength] {
+        let options = OptimizeOptions { parameterisation, ..Default::default() };
+        let name = format!("optimize: 10 m, four corners between boxes, {}", parameterisation.key());
+        criterion.bench_function(&name, |b| b.iter(|| optimize_in(&path, &field, &robot, &options)));
+    }
 }
 
 criterion_group!(optimize, benches);

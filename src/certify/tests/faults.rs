@@ -107,9 +107,8 @@ fn a_joint_outside_its_range_is_refused() {
 #[test]
 fn driving_backwards_is_refused_unless_it_is_allowed() {
     let (robot, mut table, mut task) = case();
-    let backwards = |table: &CommandTable, task: &Task| {
-        kinds(&certify(table, &robot, None, task)).contains(&RefusalKind::Reverse)
-    };
+    let backwards =
+        |table: &CommandTable, task: &Task| kinds(&certify(table, &robot, None, task)).contains(&RefusalKind::Reverse);
     task.reverse = false;
     assert!(!backwards(&table, &task));
     for row in &mut table.rows {

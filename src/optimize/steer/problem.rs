@@ -113,6 +113,8 @@ pub(super) struct Derivatives {
     pub stiff: Vec<f64>,
     /// Gaps between pieces, m.
     pub gaps: Vec<[f64; 2]>,
+    /// Their derivatives by the unknowns of their pieces, `[(piece * 2 + axis) * local size + local]`.
+    by_gaps: Vec<f64>,
 }
 
 impl Derivatives {
@@ -122,7 +124,14 @@ impl Derivatives {
             hessian: Banded::new(layout.size(), layout.width()),
             stiff: vec![0.0; layout.size()],
             gaps: vec![[0.0; 2]; layout.pieces],
+            by_gaps: vec![0.0; layout.pieces * 2 * layout.local_size()],
         }
+    }
+
+    /// Derivatives of a piece's gap by its unknowns.
+    pub fn by_gap(&self, piece: usize, axis: usize) -> &[f64] {
+        let size = self.by_gaps.len() / (2 * self.gaps.len());
+        &self.by_gaps[(piece * 2 + axis) * size..(piece * 2 + axis + 1) * size]
     }
 }
 
@@ -233,7 +242,9 @@ impl<'a, F: DistanceField> Problem<'a, F> {
         let mut cost = 0.0;
         for (piece, multiplier) in multipliers.iter().enumerate() {
             let time = self.load(piece, x);
-            let (own, gap) = self.piece(piece, x, time, *multiplier);
+            let size = self.local.size;
+            let by_gap = &mut out.by_gaps[piece * 2 * size..(piece + 1) * 2 * size];
+            let (own, gap) = self.piece(piece, x, time, *multiplier, by_gap);
             cost += own;
             out.gaps[piece] = gap;
             self.scatter(piece, time, out);
@@ -258,7 +269,14 @@ impl<'a, F: DistanceField> Problem<'a, F> {
     }
 
     /// Cost and gap of a piece; its derivatives are in `local`.
-    fn piece(&mut self, piece: usize, x: &[f64], time: f64, multiplier: [f64; 2]) -> (f64, [f64; 2]) {
+    fn piece(
+        &mut self,
+        piece: usize,
+        x: &[f64],
+        time: f64,
+        multiplier: [f64; 2],
+        by_gap: &mut [f64],
+    ) -> (f64, [f64; 2]) {
         let layout = self.layout;
         let at = layout.position(piece);
         let start = [x[at], x[at + 1]];
@@ -289,13 +307,13 @@ impl<'a, F: DistanceField> Problem<'a, F> {
         let reached = path.position();
         let end = layout.position(piece + 1);
         let gap = [start[0] + reached[0] - x[end], start[1] + reached[1] - x[end + 1]];
-        for axis in 0..2 {
-            let jacobian = &mut self.jacobian[..self.local.size];
+        for (axis, jacobian) in by_gap.chunks_exact_mut(self.local.size).enumerate() {
             gap_jacobian(layout, &path, axis, jacobian);
             self.local.add(jacobian, multiplier[axis] + STIFFNESS * gap[axis], STIFFNESS);
-            for (stiff, by) in self.local.stiff.iter_mut().zip(jacobian) {
+            for (stiff, by) in self.local.stiff.iter_mut().zip(jacobian.iter()) {
                 *stiff += STIFFNESS * *by * *by;
             }
+            self.by_unknowns(piece, time, jacobian);
         }
         (cost, gap)
     }
@@ -543,27 +561,6 @@ impl<'a, F: DistanceField> Problem<'a, F> {
         }
     }
 
-    /// Jacobians of the gaps by the unknowns of their pieces, `[piece][axis][local]`.
-    pub fn gap_jacobians(&mut self, x: &[f64]) -> Vec<[Vec<f64>; 2]> {
-        let layout = self.layout;
-        (0..layout.pieces)
-            .map(|piece| {
-                let time = self.load(piece, x);
-                let table = &self.tables[self.samples[piece].0];
-                let mut path = Integral::new(1.0 / table.count() as f64);
-                for basis in &table.bases {
-                    path.advance(basis, &basis.at(&self.data[HEADING]), &basis.at(&self.data[ARC]));
-                }
-                [0, 1].map(|axis| {
-                    let mut jacobian = vec![0.0; self.local.size];
-                    gap_jacobian(layout, &path, axis, &mut jacobian);
-                    self.by_unknowns(piece, time, &mut jacobian);
-                    jacobian
-                })
-            })
-            .collect()
-    }
-
     /// Contour points at `x`, linearised: what the motion would do to those that a step has pushed into an obstacle.
     pub fn rows(&mut self, x: &[f64], contacts: &[Contact]) -> Vec<Row> {
         let layout = self.layout;
@@ -635,11 +632,11 @@ impl<'a, F: DistanceField> Problem<'a, F> {
         }
     }
 
-    /// Takes a row's force off a vector of the unknowns.
-    pub fn pull(&self, row: &Row, out: &mut [f64]) {
-        let base = row.piece * self.layout.block();
-        for (by, offset) in row.by.iter().zip(&self.offsets) {
-            out[base + offset] -= row.weight * row.value * by;
+    /// Takes a force along a Jacobian by a piece's unknowns off a vector of all.
+    pub fn pull(&self, piece: usize, force: f64, by: &[f64], out: &mut [f64]) {
+        let base = piece * self.layout.block();
+        for (by, offset) in by.iter().zip(&self.offsets) {
+            out[base + offset] -= force * by;
         }
     }
 

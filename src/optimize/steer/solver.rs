@@ -189,11 +189,10 @@ impl Workspace {
             let after = problem.after(row, &self.step).max(0.0);
             merit.predicted += 0.5 * row.weight * after * after;
         }
-        let jacobians = problem.gap_jacobians(x);
-        for (piece, by) in jacobians.iter().enumerate() {
-            for (axis, by) in by.iter().enumerate() {
+        for piece in 0..self.multipliers.len() {
+            for axis in 0..2 {
                 let gap = self.here.gaps[piece][axis];
-                let change = problem.along(piece, by, &self.step);
+                let change = problem.along(piece, self.here.by_gap(piece, axis), &self.step);
                 let old = self.multipliers[piece][axis];
                 merit.predicted -= change * (old + STIFFNESS * gap) + 0.5 * STIFFNESS * change * change;
                 let new = old + STIFFNESS * (gap + change);
@@ -231,10 +230,10 @@ impl Workspace {
                 break;
             }
             self.step.fill(0.0);
-            for (piece, by) in problem.gap_jacobians(x).iter().enumerate() {
-                for (axis, by) in by.iter().enumerate() {
-                    let row = Row { piece, weight: STIFFNESS, value: self.here.gaps[piece][axis], by: by.clone() };
-                    problem.pull(&row, &mut self.step);
+            for piece in 0..none.len() {
+                for axis in 0..2 {
+                    let force = STIFFNESS * self.here.gaps[piece][axis];
+                    problem.pull(piece, force, self.here.by_gap(piece, axis), &mut self.step);
                 }
             }
             self.factor.solve(&mut self.step);
