@@ -243,11 +243,23 @@ fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, compile: &Compil
     }
     // Where one parameterisation fails at every margin, the other may not.
     let other = (asked == Parameterisation::ArcLength).then_some(Parameterisation::Flat);
-    let tries = [asked].into_iter().chain(other).flat_map(|p| OPTIMISER_MARGINS.map(|margin| (p, margin)));
-    for (parameterisation, margin) in tries {
+    // A motion that misses its clearance by little is looked at more closely before it is asked for more.
+    let [least, ..] = OPTIMISER_MARGINS;
+    let of = |p: Parameterisation| match p {
+        Parameterisation::Flat => OPTIMISER_MARGINS.map(|margin| (p, margin, false)).to_vec(),
+        Parameterisation::ArcLength => {
+            let closer = OPTIMISER_MARGINS.map(|margin| (p, margin, true));
+            [(p, least, false)].into_iter().chain(closer).collect()
+        }
+    };
+    let tries = [asked].into_iter().chain(other).flat_map(of);
+    for (parameterisation, margin, closer) in tries {
         let usual = if compile.spins { OptimizeOptions::default() } else { OptimizeOptions::without_spins() };
         let clearance = mission.clearance + margin;
-        let options = OptimizeOptions { parameterisation, clearance, dense: compile.dense, ..usual };
+        let mut options = OptimizeOptions { parameterisation, clearance, dense: compile.dense, ..usual };
+        if closer {
+            options.steer = options.steer.closer();
+        }
         let trajectory = run.stage("optimize", || optimize::optimize(&path, &field, robot, &options));
         // A trajectory that no law can time is one more reason to go on to the next try.
         if let Some(made) = finish.certify(run, trajectory).ok().filter(|made| made.certificate.holds()) {
