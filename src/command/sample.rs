@@ -18,8 +18,11 @@ const MOST_ROWS: f64 = 2e6;
 /// Slow-downs before giving up.
 const ATTEMPTS: usize = 60;
 
-/// Positions off at the rows as a share of those of `mean`: what `tracked` aims at, and what it is content with.
-const CLOSENESS: [f64; 2] = [0.02, 0.1];
+/// Positions off at the rows as a share of those of `mean`, per second of sampling time: what `tracked` aims at first, and then. In
+/// proportion to the sampling time, so that they fall with its third power.
+const CLOSENESS: [f64; 2] = [0.2, 1.0];
+/// The share that is no reason to slow down.
+const CLOSE: f64 = 0.1;
 /// A slow-down that corrections of `tracked` are worth: the most that they can need if nothing else is wrong.
 const WORTH: f64 = 1.034;
 
@@ -80,32 +83,39 @@ pub fn sample(
     })
 }
 
-/// The corrected table of the least slow-down, from the options of the means; `None`: there is none worth it.
+/// The corrected table of the least slow-down, from the options of the means; where none is close enough within what a slow-down is worth,
+/// the first that ends as promised within its limits. `None`: not even that.
 fn sample_tracked(
     profile: &MotionProfile,
     robot: &RobotModel,
     mean: &SampleOptions,
 ) -> Result<Option<CommandTable>, CommandError> {
     let mut rows = rows_of(profile, mean)?;
-    let mut most = f64::INFINITY;
+    let mut most = MOST_ROWS;
+    let mut second_best = None;
     for _ in 0..ATTEMPTS {
-        if rows > MOST_ROWS.min(most) {
+        if rows > most {
             break;
         }
         let table = uncorrected(profile, robot, mean, rows as usize);
         let slow_down = needed_slow_down(&table, robot);
         if slow_down <= 1.0 {
             for closeness in CLOSENESS {
+                let aim = (closeness * mean.sampling_time).min(CLOSE);
                 let mut corrected = CommandTable { sampling: Sampling::Tracked, ..table.clone() };
-                if tracked::correct(&mut corrected, robot, closeness) && needed_slow_down(&corrected, robot) <= 1.0 {
-                    return Ok(Some(corrected));
+                let Some(share) = tracked::correct(&mut corrected, robot, aim) else { continue };
+                if needed_slow_down(&corrected, robot) <= 1.0 {
+                    if share <= CLOSE {
+                        return Ok(Some(corrected));
+                    }
+                    second_best.get_or_insert(corrected);
                 }
             }
             most = most.min((rows * WORTH).max(rows + 2.0));
         }
         rows = (rows + 1.0).max((rows * slow_down * (1.0 - ROUNDING)).ceil());
     }
-    Ok(None)
+    Ok(second_best)
 }
 
 /// Samples a profile without slow-down and without correction: what the sampling alone does to a path.
@@ -118,6 +128,9 @@ pub fn sample_uncorrected(
     options: &SampleOptions,
 ) -> Result<CommandTable, CommandError> {
     let rows = rows_of(profile, options)?;
+    // What `tracked` corrects are means.
+    let sampling = if options.sampling == Sampling::Tracked { Sampling::Mean } else { options.sampling };
+    let options = &SampleOptions { sampling, ..*options };
     if rows > MOST_ROWS {
         let hold = options.sampling_time;
         return Err(CommandError::TooLong { time: rows * hold, sampling_time: hold, rows });

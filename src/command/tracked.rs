@@ -15,10 +15,10 @@ use crate::robot::{MotionLimits, RobotModel};
 use super::CommandTable;
 use regulator::{Problem, Row};
 
-/// Ends this near are exact, m and rad; a thousandth of what is promised.
-const EXACT: [f64; 2] = [1e-9, 1e-11];
+/// Ends this near need no further round, m and rad.
+const EXACT: [f64; 2] = [1e-11, 1e-12];
 /// What is promised of the end, m and rad.
-pub(super) const PROMISED: [f64; 2] = [1e-6, 1e-9];
+const PROMISED: [f64; 2] = [1e-6, 1e-9];
 /// A replay that leaves the planned positions by less needs no correction, m.
 const NOTHING: f64 = 1e-10;
 /// Rounds of linearisation at most. The first does nearly all.
@@ -32,47 +32,45 @@ const END: f64 = 1e4;
 
 /// Corrects the wheel speeds of `mean` so that the replay passes the planned positions of its rows and ends in the planned pose; limits
 /// are respected by weights, so look at them afterwards. `closeness`: positions off at the rows against those of `mean`, where limits
-/// leave room. Returns whether it ends where it promises to.
-pub(super) fn correct(table: &mut CommandTable, robot: &RobotModel, closeness: f64) -> bool {
-    let Some((last, start)) = table.rows.len().checked_sub(1).zip(table.rows.first().map(|row| row.pose)) else {
-        return false;
-    };
+/// leave room. Returns what that share came to be; `None` where the end is not as near as promised.
+pub(super) fn correct(table: &mut CommandTable, robot: &RobotModel, closeness: f64) -> Option<f64> {
+    let last = table.rows.len().checked_sub(1)?;
+    let start = table.rows[0].pose;
     let base: Vec<[f64; 2]> = (0..last).map(|k| rims(table, k)).collect();
-    let farthest = replayed(table, start).iter().map(|off| off[0].hypot(off[1])).fold(0.0, f64::max);
-    if farthest <= NOTHING {
-        return true;
+    let mut off = replayed(table, start);
+    let before = farthest(&off);
+    if before <= NOTHING {
+        return Some(0.0);
     }
     let mut rows = weights(table, robot, &base);
     let rest = rest_weights(table, robot, &base);
-    let position = (closeness * farthest).powi(-2);
+    let position = (closeness * before).powi(-2);
     let end = [END * position, END * END * position];
     let mut multipliers = [0.0; 3];
     let mut corrections = vec![[0.0; 2]; last];
     for _ in 0..ROUNDS {
-        let off = replayed(table, start);
+        linearise(table, &off, &corrections, &mut rows);
+        let turn = table.sampling_time / table.track_width;
+        corrections = Problem { rows: &rows, turn, position, end: (end, multipliers), rest }.solve()?;
+        for (row, (base, more)) in table.rows.iter_mut().zip(base.iter().zip(&corrections)) {
+            row.wheel_left = (base[0] + more[0]) / table.wheel_radius;
+            row.wheel_right = (base[1] + more[1]) / table.wheel_radius;
+        }
+        off = replayed(table, start);
         let miss = off[last];
-        if miss[0].hypot(miss[1]) <= EXACT[0] && miss[2].abs() <= EXACT[1] && corrections != vec![[0.0; 2]; last] {
+        if miss[0].hypot(miss[1]) <= EXACT[0] && miss[2].abs() <= EXACT[1] {
             break;
         }
-        linearise(table, &off, &corrections, &mut rows);
-        let problem = Problem {
-            rows: &rows,
-            turn: table.sampling_time / table.track_width,
-            position,
-            end: (end, multipliers),
-            rest,
-        };
-        let Some(found) = problem.solve() else { return false };
-        corrections = found;
-        for (k, [left, right]) in corrections.iter().enumerate() {
-            table.rows[k].wheel_left = (base[k][0] + left) / table.wheel_radius;
-            table.rows[k].wheel_right = (base[k][1] + right) / table.wheel_radius;
-        }
-        let off = replayed(table, start)[last];
-        (0..3).for_each(|i| multipliers[i] += end[usize::from(i == 2)] * off[i]);
+        (0..3).for_each(|i| multipliers[i] += end[usize::from(i == 2)] * miss[i]);
     }
-    let [x, y, heading] = replayed(table, start)[last];
-    x.hypot(y) <= PROMISED[0] && heading.abs() <= PROMISED[1]
+    let [x, y, heading] = off[last];
+    let promised = x.hypot(y) <= PROMISED[0] && heading.abs() <= PROMISED[1];
+    promised.then(|| farthest(&off) / before)
+}
+
+/// The largest distance of positions that are off, m.
+fn farthest(off: &[[f64; 3]]) -> f64 {
+    off.iter().map(|[x, y, _]| x.hypot(*y)).fold(0.0, f64::max)
 }
 
 /// Rim speeds of a row, m/s.

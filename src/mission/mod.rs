@@ -134,12 +134,17 @@ pub enum PathSpec {
 /// How wheel speeds become held commands; `MATH` section 8.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sampling {
-    /// Travel over the interval divided by its length.
+    /// Travel over the interval divided by its length: wheels, joints and heading are where they should be at every row.
     Mean,
-    /// The speed at the interval's start.
+    /// The speed at the interval's start, as in \[CONV\].
     Instant,
-    /// Corrected on the replay (a later issue).
+    /// `Mean`, corrected on the replay: positions are where they should be at every row, heading and joints at the end.
     Tracked,
+}
+
+impl Sampling {
+    /// Where nobody asks for another.
+    pub const DEFAULT: Self = Self::Tracked;
 }
 
 /// How a path is timed.

@@ -42,7 +42,7 @@ pub(super) fn parse(name: &str, text: &str) -> Result<Mission, Diagnostics> {
         path: root.get("path").and_then(given_path),
         clearance: number("clearance_m", 0.05),
         sampling_time: number("sampling_time_s", 0.1),
-        sampling: pick(&SAMPLING_LAWS, word("sampling")).unwrap_or(Sampling::Mean),
+        sampling: pick(&SAMPLING_LAWS, word("sampling")).unwrap_or(Sampling::DEFAULT),
         time_law,
         reverse: root.get("reverse").and_then(Node::flag).unwrap_or(false),
         parameterisation: pick(&PARAMETERISATIONS, word("parameterisation"))
