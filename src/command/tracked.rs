@@ -82,7 +82,8 @@ fn rims(table: &CommandTable, k: usize) -> [f64; 2] {
 /// By how much the replay is off at each row: x, y (m), heading (rad).
 fn replayed(table: &CommandTable, start: Pose2) -> Vec<[f64; 3]> {
     let poses = table.replay(start);
-    let off = poses.iter().zip(&table.rows).map(|(is, row)| [is.x - row.pose.x, is.y - row.pose.y, is.yaw - row.pose.yaw]);
+    let off =
+        poses.iter().zip(&table.rows).map(|(is, row)| [is.x - row.pose.x, is.y - row.pose.y, is.yaw - row.pose.yaw]);
     off.collect()
 }
 
@@ -110,7 +111,8 @@ fn linearise(table: &CommandTable, off: &[[f64; 3]], corrections: &[[f64; 2]], r
 
 /// Rows with their weights: one over the square of the room that is left.
 fn weights(table: &CommandTable, robot: &RobotModel, base: &[[f64; 2]]) -> Vec<Row> {
-    let nothing = Row { by_heading: [0.0; 2], by_wheel: [[0.0; 2]; 2], drift: [0.0; 2], wheels: [[0.0; 3]; 2], twist: [0.0; 2] };
+    let nothing =
+        Row { by_heading: [0.0; 2], by_wheel: [[0.0; 2]; 2], drift: [0.0; 2], wheels: [[0.0; 3]; 2], twist: [0.0; 2] };
     let mut rows = vec![nothing; base.len()];
     let limits = bounds(&robot.wheel, table, base);
     for side in 0..2 {

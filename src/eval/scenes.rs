@@ -65,6 +65,7 @@ impl SceneSet {
             reverse: self.reverse,
             parameterisation: Parameterisation::DEFAULT,
             path_error_times: Vec::new(),
+            path_error_samplings: Vec::new(),
             limits: self.limits.clone(),
             source: Default::default(),
             spans: Default::default(),

@@ -39,6 +39,8 @@ pub struct Mission {
     pub parameterisation: Parameterisation,
     /// Sampling times of the path-error report, seconds, ascending.
     pub path_error_times: Vec<f64>,
+    /// Samplings that it is reported for: the mission's own, unless somebody asks for others.
+    pub path_error_samplings: Vec<Sampling>,
     /// Overrides of the robot's limits.
     pub limits: LimitsSpec,
     /// The text it was read from.

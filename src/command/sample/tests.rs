@@ -216,7 +216,8 @@ fn tracked_rows_come_nearer_with_the_third_power_of_the_sampling_time() {
         });
         // Slope of the straight line that fits best.
         let mean = [0, 1].map(|i| logs.iter().map(|row| row[i]).sum::<f64>() / logs.len() as f64);
-        let sum = |f: fn([f64; 2]) -> f64| -> f64 { logs.iter().map(|row| f([row[0] - mean[0], row[1] - mean[1]])).sum() };
+        let sum =
+            |f: fn([f64; 2]) -> f64| -> f64 { logs.iter().map(|row| f([row[0] - mean[0], row[1] - mean[1]])).sum() };
         let order = sum(|[x, y]| x * y) / sum(|[x, _]| x * x);
         assert!(order > 3.0, "{order}");
     }
@@ -226,7 +227,8 @@ fn tracked_rows_come_nearer_with_the_third_power_of_the_sampling_time() {
 fn what_arcs_replay_exactly_is_left_as_it_is() {
     // A spin, and a straight line: means are exact already, to the bit.
     let robot = fixtures::scr_db();
-    let spin = StillLeg { pose: Pose2::new(1.0, 2.0, 0.5), yaw_end: -2.0, joints_from: vec![0.0], joints_to: vec![0.4] };
+    let spin =
+        StillLeg { pose: Pose2::new(1.0, 2.0, 0.5), yaw_end: -2.0, joints_from: vec![0.0], joints_to: vec![0.4] };
     let spin = Trajectory { legs: vec![Leg::Still(spin)], source: TrajectorySource::Search, optimiser: None };
     let line = given::from_bezier(&[[[0.0, 0.0], [1.0, 1.0], [2.0, 2.0], [3.0, 3.0]]], &[0.3]).unwrap();
     for trajectory in [spin, line] {

@@ -100,14 +100,8 @@ impl Problem<'_> {
     /// The cost of a row's corrections and the state before it, from the cost of the state behind it.
     fn before(&self, row: &Row, square: &Square, linear: &[f64; STATE]) -> ([[f64; SIZE]; SIZE], [f64; SIZE]) {
         // The state behind, as sums over (corrections, state before).
-        let position = |d: usize| {
-            [
-                (0, row.by_wheel[0][d]),
-                (1, row.by_wheel[1][d]),
-                (2 + d, 1.0),
-                (4, row.by_heading[d]),
-            ]
-        };
+        let position =
+            |d: usize| [(0, row.by_wheel[0][d]), (1, row.by_wheel[1][d]), (2 + d, 1.0), (4, row.by_heading[d])];
         let nothing = (0, 0.0);
         let behind: [[(usize, f64); 4]; 3] =
             [position(0), position(1), [(0, -self.turn), (1, self.turn), (4, 1.0), nothing]];
