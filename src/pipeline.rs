@@ -211,7 +211,10 @@ fn stages(
         return Err(refused(&certificate, trajectory.source).into());
     }
     if !mission.path_error_times.is_empty() {
-        let rows = run.stage("path_error", || finish.path_errors(&profile, &trajectory));
+        let rows = run.stage("path_error", || {
+            let known = (&commands, certificate.clearance_proven);
+            finish.path_errors(&profile, &trajectory, known)
+        });
         run.report.path_error = rows?;
     }
     let within = match options.max_error {
@@ -297,13 +300,15 @@ impl Finish<'_> {
         Task { start, start_joints, goal, clearance: self.mission.clearance }
     }
 
+    /// `known`: a table whose clearance is proven already.
     fn path_errors(
         &self,
         profile: &MotionProfile,
         trajectory: &Trajectory,
+        known: (&CommandTable, Option<f64>),
     ) -> Result<Vec<crate::report::PathErrorRow>, Diagnostics> {
         let task = self.task(trajectory);
-        let clearance = |table: &CommandTable| self.clearance(table, &task);
+        let clearance = |table: &CommandTable| if table == known.0 { known.1 } else { self.clearance(table, &task) };
         let (times, samplings) = (&self.mission.path_error_times, &self.mission.path_error_samplings);
         let rows = path_error::path_errors(profile, self.robot, times, samplings, clearance)?;
         Ok(rows.iter().map(Into::into).collect())

@@ -16,7 +16,7 @@ use super::CommandTable;
 use regulator::{Problem, Row};
 
 /// Ends this near need no further round, m and rad.
-const EXACT: [f64; 2] = [1e-11, 1e-12];
+const EXACT: [f64; 2] = [1e-10, 1e-11];
 /// What is promised of the end, m and rad.
 const PROMISED: [f64; 2] = [1e-6, 1e-9];
 /// A replay that leaves the planned positions by less needs no correction, m.

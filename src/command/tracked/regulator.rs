@@ -166,3 +166,101 @@ fn eliminate(mut matrix: [[f64; SIZE]; SIZE], mut vector: [f64; SIZE]) -> Option
     let square = std::array::from_fn(|i| std::array::from_fn(|j| matrix[2 + i][2 + j]));
     Some((gain, square, std::array::from_fn(|i| vector[2 + i])))
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+
+    use super::*;
+
+    /// A few rows of a turning drive, unevenly weighed.
+    fn rows() -> Vec<Row> {
+        let row = |k: usize| {
+            let (sin, cos) = (0.3 * k as f64).sin_cos();
+            let by_heading = [-0.05 * sin, 0.05 * cos];
+            let aside = 0.5 * 0.1 / 0.4;
+            let along = |arm: f64| [0.05 * cos + arm * by_heading[0], 0.05 * sin + arm * by_heading[1]];
+            Row {
+                by_heading,
+                by_wheel: [along(-aside), along(aside)],
+                drift: [1e-3 * cos, 2e-3 * sin],
+                wheels: [[1.0 + k as f64, 3.0, 2.0], [2.0, 1.0, 4.0 - 0.3 * k as f64]],
+                twist: [0.5, 1.5],
+            }
+        };
+        (0..7).map(row).collect()
+    }
+
+    #[test]
+    fn corrections_are_the_least_squares_of_everything_at_once() {
+        let rows = rows();
+        let (turn, position, end) = (0.25, 1e3, ([1e5, 1e4], [0.3, -0.2, 0.1]));
+        let rest = [[2.0, 3.0], [1.0, 5.0]];
+        let found = Problem { rows: &rows, turn, position, end, rest }.solve().expect("weights on everything");
+
+        // The same cost from the definition, as a function of all corrections.
+        let cost = |c: &[f64]| -> f64 {
+            let correction = |k: isize, wheel: usize| {
+                let at = usize::try_from(k).ok().filter(|k| *k < rows.len());
+                at.map_or(0.0, |k| c[2 * k + wheel])
+            };
+            let (mut off, mut heading, mut sum) = ([0.0; 2], 0.0, 0.0);
+            for (k, row) in rows.iter().enumerate() {
+                let k = k as isize;
+                for d in 0..2 {
+                    let wheels: f64 = (0..2).map(|wheel| row.by_wheel[wheel][d] * correction(k, wheel)).sum();
+                    off[d] += row.by_heading[d] * heading + wheels + row.drift[d];
+                }
+                heading += turn * (correction(k, 1) - correction(k, 0));
+                let weight = if k as usize + 1 < rows.len() { position } else { end.0[0] };
+                sum += weight * (off[0] * off[0] + off[1] * off[1]);
+                let [left, right] = [0, 1].map(|wheel| correction(k, wheel));
+                sum += row.twist[0] * (0.5 * (left + right)).powi(2) + row.twist[1] * (0.5 * (right - left)).powi(2);
+                sum += (0..2).map(|wheel| row.wheels[wheel][0] * correction(k, wheel).powi(2)).sum::<f64>();
+            }
+            for k in 0..rows.len() as isize + 2 {
+                for wheel in 0..2 {
+                    let weights =
+                        rows.get(k as usize).map_or(rest[wheel], |row| [row.wheels[wheel][1], row.wheels[wheel][2]]);
+                    let [now, last, before] = [0, 1, 2].map(|back| correction(k - back, wheel));
+                    let first = if k as usize > rows.len() { 0.0 } else { weights[0] * (now - last).powi(2) };
+                    sum += first + weights[1] * (now - 2.0 * last + before).powi(2);
+                }
+            }
+            let linear = end.1[0] * off[0] + end.1[1] * off[1] + end.1[2] * heading;
+            sum + end.0[1] * heading * heading + 2.0 * linear
+        };
+        // A quadratic function: its matrix from values, exactly but for rounding.
+        let size = 2 * rows.len();
+        let unit = |i: usize, j: usize| {
+            let mut c = vec![0.0; size];
+            c[i] += 1.0;
+            c[j] += 1.0;
+            c
+        };
+        let (nothing, mut single) = (cost(&vec![0.0; size]), vec![0.0; size]);
+        let alone: Vec<f64> = (0..size)
+            .map(|i| {
+                single.fill(0.0);
+                single[i] = 1.0;
+                cost(&single)
+            })
+            .collect();
+        let matrix = DMatrix::from_fn(size, size, |i, j| 0.5 * (cost(&unit(i, j)) - alone[i] - alone[j] + nothing));
+        let half = DVector::from_fn(size, |i, _| 0.5 * (alone[i] - nothing - matrix[(i, i)]));
+        let expected = matrix.lu().solve(&-half).expect("regular");
+        for (k, pair) in found.iter().enumerate() {
+            for wheel in 0..2 {
+                assert!((pair[wheel] - expected[2 * k + wheel]).abs() < 1e-7, "{k}: {pair:?} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn without_weights_there_is_no_answer() {
+        let free = Row { wheels: [[0.0; 3]; 2], twist: [0.0; 2], by_wheel: [[0.0; 2]; 2], ..rows()[0] };
+        let problem =
+            Problem { rows: &[free], turn: 0.0, position: 1.0, end: ([1.0; 2], [0.0; 3]), rest: [[0.0; 2]; 2] };
+        assert_eq!(problem.solve(), None);
+    }
+}

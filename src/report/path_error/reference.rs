@@ -15,6 +15,8 @@ const TURN: f64 = 0.02;
 const LEAST_STEP: f64 = 1e-5;
 /// Cells of the look-up grid at most, and their least size, m.
 const GRID: (f64, f64) = (1e5, 2e-2);
+/// What a curve of the third order may be off the path by, m.
+const LEFT_OUT: f64 = 1e-11;
 /// A point this near to where it is looked for first is looked for nowhere else, m.
 const NEAR: f64 = 0.5e-3;
 
@@ -123,7 +125,18 @@ impl PathReference {
     /// Distance from a point to the path, m.
     pub fn distance(&self, point: [f64; 2]) -> f64 {
         let cells = self.cells.get_or_init(|| Cells::new(&self.vertices));
-        self.distance_about(cells.nearest(&self.vertices, point), point)
+        let off = |k: usize| square(self.vertices[k].point, point);
+        let nearest = cells.nearest(&self.vertices, point);
+        let mut least = self.distance_about(nearest, point);
+        // Another stretch of the path may pass nearer between two of its vertices.
+        let reach = off(nearest).sqrt() + STEP;
+        cells.within(point, reach, |k| {
+            let farther = |other: Option<usize>| other.is_none_or(|j| j >= self.vertices.len() || off(j) >= off(k));
+            if off(k) <= reach * reach && farther(k.checked_sub(1)) && farther(Some(k + 1)) {
+                least = least.min(self.distance_about(k, point));
+            }
+        });
+        least
     }
 
     /// Distance from a point to the path, m, for points in order of the distance driven, of which `cursor` remembers the last: first
@@ -144,16 +157,14 @@ impl PathReference {
             least = off(nearest);
         }
         let vertex = &self.vertices[nearest];
-        let near = match vertex.about {
-            Some(about) => {
-                let offset = [point[0] - vertex.point[0], point[1] - vertex.point[1]];
-                let [cos, sin] = about.direction;
-                let along = offset[0] * cos + offset[1] * sin;
-                let rise = along * along * (0.5 * about.curvature + along * about.change / 6.0);
-                (offset[1] * cos - offset[0] * sin - rise).abs()
-            }
-            None => self.distance_about(nearest, point),
-        };
+        // At corners, cusps and ends, what is beside may be another stretch of the path.
+        let near = vertex.about.map_or(f64::INFINITY, |about| {
+            let offset = [point[0] - vertex.point[0], point[1] - vertex.point[1]];
+            let [cos, sin] = about.direction;
+            let along = offset[0] * cos + offset[1] * sin;
+            let rise = along * along * (0.5 * about.curvature + along * about.change / 6.0);
+            (offset[1] * cos - offset[0] * sin - rise).abs()
+        });
         if near <= NEAR { near } else { self.distance(point) }
     }
 
@@ -221,17 +232,18 @@ fn smooth_out(vertices: &mut [Vertex]) {
         let turned = from.direction[0] * to.direction[0] + from.direction[1] * to.direction[1];
         let bent = from.curvature.abs().max(to.curvature.abs()) * length;
         let joined = a.course == b.course && turned > 1.0 - 2.0 * TURN * TURN && bent <= 2.0 * TURN;
-        // What is left beyond the third order stays below a share of the distances that count.
         (joined && length > 0.0).then(|| (to.curvature - from.curvature) / length)
     };
     let changes: Vec<Option<f64>> = vertices.windows(2).map(|pair| smooth(&pair[0], &pair[1])).collect();
+    let lengths: Vec<f64> = vertices.windows(2).map(|pair| pair[1].travelled - pair[0].travelled).collect();
     for (k, vertex) in vertices.iter_mut().enumerate() {
-        let before = k.checked_sub(1).and_then(|k| changes[k]);
-        let after = changes.get(k).copied().flatten();
-        vertex.about = before
-            .zip(after)
-            .zip(vertex.about)
-            .map(|((before, after), about)| About { change: 0.5 * (before + after), ..about });
+        let before = k.checked_sub(1).and_then(|k| Some((changes[k]?, lengths[k])));
+        let after = changes.get(k).copied().flatten().map(|change| (change, lengths[k]));
+        vertex.about = before.zip(after).zip(vertex.about).and_then(|(((before, back), (after, ahead)), about)| {
+            // Halfway to the next vertex the fourth order is this.
+            let left_out = (after - before).abs() * back.max(ahead).powi(3) / 384.0;
+            (left_out <= LEFT_OUT).then_some(About { change: 0.5 * (before + after), ..about })
+        });
     }
 }
 
@@ -282,6 +294,16 @@ impl Cells {
 
     fn flat(&self, [i, j]: [usize; 2]) -> usize {
         i * self.size[1] + j
+    }
+
+    /// Visits all vertices within a distance of a point, and some others.
+    fn within(&self, point: [f64; 2], reach: f64, mut visit: impl FnMut(usize)) {
+        let [low, high] = [-reach, reach].map(|side| self.cell_of([point[0] + side, point[1] + side]));
+        for i in low[0]..=high[0] {
+            let cells = self.flat([i, low[1]])..=self.flat([i, high[1]]);
+            let members = self.starts[*cells.start()] as usize..self.starts[*cells.end() + 1] as usize;
+            self.members[members].iter().for_each(|member| visit(*member as usize));
+        }
     }
 
     /// The vertex nearest to a point: rings of cells about it, until no nearer one can follow.

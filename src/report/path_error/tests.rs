@@ -52,7 +52,8 @@ fn distances_to_a_given_curve_are_those_to_its_positions() {
         let point = [-1.0 + a * 0.3, -0.7 + b * 0.31];
         let brute = nearest(&dense, point);
         let found = reference.distance(point);
-        assert!(found <= brute + 1e-15 && found > brute - 1e-9, "{point:?}: {found} vs {brute}");
+        // The search for the foot ends within 1e-9 of the distance; positions are up to half of 0.1 mm beside it.
+        assert!(found <= brute * (1.0 + 1e-9) && found > brute - 2e-9 / brute, "{point:?}: {found} vs {brute}");
     }
 }
 
@@ -149,13 +150,17 @@ fn looking_along_the_path_finds_what_looking_everywhere_finds() {
             let (mut cursor, mut travelled, mut before) = (0, 0.0, profile.pose(0.0));
             for i in 0..2000 {
                 let pose = profile.pose(profile.time() * f64::from(i) / 2000.0);
-                travelled += pose.distance(before);
-                before = pose;
+                // As a replay knows it: from speeds, so only nearly.
+                for part in 1..=20 {
+                    let next = profile.pose(profile.time() * (f64::from(i) - 1.0 + f64::from(part) / 20.0) / 2000.0);
+                    travelled += next.distance(before);
+                    before = next;
+                }
                 let (sin, cos) = (1.1 * f64::from(i)).sin_cos();
                 let point = [pose.x + aside * cos, pose.y + aside * sin];
                 let (along, everywhere) =
                     (reference.distance_along(point, travelled, &mut cursor), reference.distance(point));
-                assert!((along - everywhere).abs() <= 1e-4 * everywhere + 1e-11, "{i} {aside}: {along} {everywhere}");
+                assert!((along - everywhere).abs() <= 1e-4 * everywhere + 2e-9, "{i} {aside}: {along} {everywhere}");
             }
         }
     }
