@@ -201,6 +201,8 @@ fn the_command_line() {
         ("usage_format", &["compile", "missions/a.yaml", "--format", "bag"]),
         ("usage_shell", &["completions", "basch"]),
         ("usage_schema", &["schema", "map"]),
+        ("usage_sampling_word", &["path-error", "missions/a.yaml", "--sampling", "midpoint"]),
+        ("usage_max_error", &["path-error", "missions/a.yaml", "--max-error", "5cm"]),
         ("usage_sampling_times", &["path-error", "missions/a.yaml", "--sampling-times", "0.1,none"]),
     ] {
         let run = sandbox.run(args).expect(2);

@@ -38,7 +38,9 @@ pub(super) struct Vertex {
     place: Place,
     /// Distance driven up to it, m.
     travelled: f64,
-    /// Where it is not a corner, a cusp or an end: direction of travel, curvature and its change with the distance.
+    /// A corner, a cusp or an end of a leg: there, or beside it, the path does not go on smoothly.
+    corner: bool,
+    /// Where that is near enough: direction of travel, curvature and its change with the distance.
     about: Option<About>,
 }
 
@@ -67,7 +69,7 @@ impl PathReference {
                 };
                 let about = (about.curvature.is_finite() && about.direction[0].is_finite()).then_some(about);
                 let (point, travelled) = ([x[0], y[0]], travelled + along);
-                vertices.push(Vertex { point, course: index as u32, place, travelled, about });
+                vertices.push(Vertex { point, course: index as u32, place, travelled, corner: false, about });
             };
             match course {
                 Course::Curved(curved) => {
@@ -131,8 +133,10 @@ impl PathReference {
         // Another stretch of the path may pass nearer between two of its vertices.
         let reach = off(nearest).sqrt() + STEP;
         cells.within(point, reach, |k| {
-            let farther = |other: Option<usize>| other.is_none_or(|j| j >= self.vertices.len() || off(j) >= off(k));
-            if off(k) <= reach * reach && farther(k.checked_sub(1)) && farther(Some(k + 1)) {
+            let own = off(k);
+            let before = k.checked_sub(1).is_none_or(|j| off(j) > own);
+            if own <= reach * reach && before && self.vertices.get(k + 1).is_none_or(|v| square(v.point, point) >= own)
+            {
                 least = least.min(self.distance_about(k, point));
             }
         });
@@ -157,14 +161,18 @@ impl PathReference {
             least = off(nearest);
         }
         let vertex = &self.vertices[nearest];
-        // At corners, cusps and ends, what is beside may be another stretch of the path.
-        let near = vertex.about.map_or(f64::INFINITY, |about| {
-            let offset = [point[0] - vertex.point[0], point[1] - vertex.point[1]];
-            let [cos, sin] = about.direction;
-            let along = offset[0] * cos + offset[1] * sin;
-            let rise = along * along * (0.5 * about.curvature + along * about.change / 6.0);
-            (offset[1] * cos - offset[0] * sin - rise).abs()
-        });
+        let near = match vertex.about {
+            // What is beside may be another stretch of the path.
+            _ if vertex.corner => f64::INFINITY,
+            Some(about) => {
+                let offset = [point[0] - vertex.point[0], point[1] - vertex.point[1]];
+                let [cos, sin] = about.direction;
+                let along = offset[0] * cos + offset[1] * sin;
+                let rise = along * along * (0.5 * about.curvature + along * about.change / 6.0);
+                (offset[1] * cos - offset[0] * sin - rise).abs()
+            }
+            None => self.distance_about(nearest, point),
+        };
         if near <= NEAR { near } else { self.distance(point) }
     }
 
@@ -239,6 +247,7 @@ fn smooth_out(vertices: &mut [Vertex]) {
     for (k, vertex) in vertices.iter_mut().enumerate() {
         let before = k.checked_sub(1).and_then(|k| Some((changes[k]?, lengths[k])));
         let after = changes.get(k).copied().flatten().map(|change| (change, lengths[k]));
+        vertex.corner = before.is_none() || after.is_none();
         vertex.about = before.zip(after).zip(vertex.about).and_then(|(((before, back), (after, ahead)), about)| {
             // Halfway to the next vertex the fourth order is this.
             let left_out = (after - before).abs() * back.max(ahead).powi(3) / 384.0;
