@@ -54,7 +54,7 @@ fn benches(c: &mut Criterion) {
         c.bench_function(&format!("retime/{name}"), |b| b.iter(|| retime(&trajectory, &robot, &options)));
         c.bench_function(&format!("sample/{name}"), |b| b.iter(|| sample(&profile, &robot, &sampling)));
         c.bench_function(&format!("path_error/{name}"), |b| {
-            b.iter(|| path_errors(&profile, &robot, &[0.1], Sampling::Mean, |_| None));
+            b.iter(|| path_errors(&profile, &robot, &[0.1], &[Sampling::Mean], |_| None));
         });
     }
 }

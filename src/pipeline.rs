@@ -75,11 +75,13 @@ pub struct CompileOptions {
     pub dense: bool,
     /// Turns that are better made on the spot stay so. False: every turn is part of a smooth curve, as in \[SCR\]. Default true.
     pub spins: bool,
+    /// Also find the largest sampling time with which commands leave the path by no more than this, m. Default: no.
+    pub max_error: Option<f64>,
 }
 
 impl Default for CompileOptions {
     fn default() -> Self {
-        Self { sampling_time: None, parameterisation: None, dense: true, spins: true }
+        Self { sampling_time: None, parameterisation: None, dense: true, spins: true, max_error: None }
     }
 }
 
@@ -105,6 +107,8 @@ pub struct Compiled {
     pub commands: CommandTable,
     /// The proof.
     pub certificate: Certificate,
+    /// Where [`CompileOptions::max_error`] asks: the largest sampling time for each of the mission's samplings.
+    pub within: Vec<path_error::Within>,
 }
 
 /// What a mission's text and files mean, before anything is planned.
@@ -207,10 +211,17 @@ fn stages(
         return Err(refused(&certificate, trajectory.source).into());
     }
     if !mission.path_error_times.is_empty() {
-        let rows = run.stage("path_error", || finish.path_errors(&profile, &trajectory));
+        let rows = run.stage("path_error", || {
+            let known = (&commands, certificate.clearance_proven);
+            finish.path_errors(&profile, &trajectory, known)
+        });
         run.report.path_error = rows?;
     }
-    Ok(Compiled { robot: robot.clone(), trajectory, commands, certificate })
+    let within = match options.max_error {
+        Some(bound) => run.stage("max_error", || finish.within(&profile, &trajectory, bound))?,
+        None => Vec::new(),
+    };
+    Ok(Compiled { robot: robot.clone(), trajectory, commands, certificate, within })
 }
 
 /// A trajectory timed, sampled and judged.
@@ -301,16 +312,36 @@ impl Finish<'_> {
         Task { start, start_joints, goal, clearance: self.mission.clearance, reverse: self.mission.reverse }
     }
 
+    /// `known`: a table whose clearance is proven already.
     fn path_errors(
         &self,
         profile: &MotionProfile,
         trajectory: &Trajectory,
+        known: (&CommandTable, Option<f64>),
     ) -> Result<Vec<crate::report::PathErrorRow>, Diagnostics> {
         let task = self.task(trajectory);
-        let clearance = |table: &CommandTable| certify::certify(table, self.robot, self.map, &task).clearance_proven;
-        let times = &self.mission.path_error_times;
-        let rows = path_error::path_errors(profile, self.robot, times, self.mission.sampling, clearance)?;
+        let clearance = |table: &CommandTable| if table == known.0 { known.1 } else { self.clearance(table, &task) };
+        let (times, samplings) = (&self.mission.path_error_times, &self.mission.path_error_samplings);
+        let rows = path_error::path_errors(profile, self.robot, times, samplings, clearance)?;
         Ok(rows.iter().map(Into::into).collect())
+    }
+
+    fn within(
+        &self,
+        profile: &MotionProfile,
+        trajectory: &Trajectory,
+        bound: f64,
+    ) -> Result<Vec<path_error::Within>, Diagnostics> {
+        let task = self.task(trajectory);
+        let of = |sampling: &crate::mission::Sampling| {
+            let clearance = |table: &CommandTable| self.clearance(table, &task);
+            Ok(path_error::within(profile, self.robot, *sampling, bound, clearance)?)
+        };
+        self.mission.path_error_samplings.iter().map(of).collect()
+    }
+
+    fn clearance(&self, table: &CommandTable, task: &Task) -> Option<f64> {
+        self.map.map(|map| certify::clearance_proven(table, self.robot, map, task))
     }
 }
 

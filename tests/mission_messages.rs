@@ -113,7 +113,7 @@ fn wrong_values() {
     mission("height_crossed", &with("map: {file: a.pcd, height_m: [1.0, 0.02]}"));
     mission("height_count", &with("map: {file: a.pcd, height_m: [1.0]}"));
     mission("unknown_word", &with("map: {file: a.pcd, unknown: ocupied}"));
-    mission("sampling_tracked", &with("sampling: tracked"));
+    mission("sampling_word", &with("sampling: traced"));
     mission("time_law_word", &with("time_law: fastest"));
     mission("flag", &with("reverse: yes"));
     mission("list_for_table", &with("start: [0.5, 0.5, 0]"));

@@ -141,6 +141,15 @@ fn within(figure: f64, bound: f64) -> bool {
     figure <= bound
 }
 
+/// The clearance alone that [`certify`] proves, m; zero for a table that cannot be replayed.
+pub fn clearance_proven(table: &CommandTable, robot: &RobotModel, map: &VoxelMap, task: &Task) -> f64 {
+    if !table::unreadable(table, robot, task).is_empty() {
+        return 0.0;
+    }
+    let rollout = Rollout::new(table, task.start, &task.start_joints);
+    clearance::clearance(&rollout, robot, map, task.clearance).proven
+}
+
 /// Judges a command table: replays it from the task's start and checks table, limits, ends and, with a map, clearance.
 ///
 /// A table that cannot be replayed (no rows, numbers that are not finite, joints that are not the robot's) is refused with

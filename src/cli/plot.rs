@@ -4,7 +4,8 @@ use crate::command::CommandTable;
 use crate::map::VoxelMap;
 use crate::mission::{Mission, PathSpec};
 use crate::pipeline::World;
-use crate::report::plot::{Figure, Panel, TopView, motion, place};
+use crate::report::PathErrorRow;
+use crate::report::plot::{Chart, Figure, Join, Panel, Spread, TopView, motion, place};
 use crate::robot::RobotModel;
 
 /// Points drawn of each segment of a given path.
@@ -32,6 +33,36 @@ pub(super) fn robot(robot: &RobotModel) -> Figure {
 /// A map from above.
 pub(super) fn map(name: &str, map: &VoxelMap) -> Figure {
     figure(format!("Map {name}"), TopView::of_map(map, f64::INFINITY))
+}
+
+/// Path error against sampling time, as \[CONV\] Fig. 16: a line for each sampling, with the bound if there is one (m).
+pub(super) fn path_error(name: &str, rows: &[PathErrorRow], bound: Option<f64>) -> Figure {
+    let mut samplings: Vec<&str> = Vec::new();
+    for row in rows {
+        if !samplings.contains(&row.sampling.as_str()) {
+            samplings.push(&row.sampling);
+        }
+    }
+    let chart = |title: &str, error: fn(&PathErrorRow) -> f64| {
+        let empty = Chart::new(title, "sampling time s", "error mm");
+        let mut chart = Chart { x_spread: Spread::Logarithmic, y_spread: Spread::Logarithmic, ..empty };
+        for sampling in &samplings {
+            let own = rows.iter().filter(|row| row.sampling == *sampling);
+            let mut points: Vec<[f64; 2]> = own.map(|row| [row.sampling_time_s, error(row) * 1e3]).collect();
+            points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+            chart = chart.line(*sampling, points, Join::Dots);
+        }
+        let chart = bound.map_or_else(|| chart.clone(), |bound| chart.clone().level("asked for", bound * 1e3));
+        Panel::Chart(chart)
+    };
+    Figure {
+        title: format!("Path error of {name}"),
+        lines: vec!["Replay of held commands against the planned path.".to_owned()],
+        panels: vec![
+            chart("Largest distance from the path", |row| row.lateral_max_m),
+            chart("Distance at the end", |row| row.end_point_m),
+        ],
+    }
 }
 
 /// A mission: map or given path, start and goal.

@@ -6,9 +6,6 @@ use crate::mission::Sampling;
 /// Why a profile cannot be sampled.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CommandError {
-    /// A sampling of a later version.
-    #[error("sampling `tracked` is not there yet")]
-    NotYet,
     /// Not a positive number.
     #[error("sampling time {sampling_time} s is not a positive number")]
     SamplingTime {
@@ -57,7 +54,6 @@ impl Describe for CommandError {
     fn diagnostic(&self) -> Diagnostic {
         let shorter = "take a shorter sampling time";
         match self {
-            Self::NotYet => Diagnostic::error("command/not-yet", self).hint("use `sampling: mean` or `instant`"),
             Self::SamplingTime { .. } => Diagnostic::error("command/sampling-time", self),
             Self::TooLong { .. } => Diagnostic::failure("command/too-long", self)
                 .hint("another time law may be much faster: `auto` takes the fastest"),

@@ -5,6 +5,7 @@ pub mod error;
 pub mod limits;
 mod replay;
 pub mod sample;
+mod tracked;
 
 use crate::geom::Pose2;
 use crate::mission::Sampling;
@@ -73,6 +74,6 @@ impl CommandTable {
 pub struct SampleOptions {
     /// s.
     pub sampling_time: f64,
-    /// `Mean` or `Instant`.
+    /// How wheel speeds follow from the profile.
     pub sampling: Sampling,
 }

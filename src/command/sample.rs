@@ -5,7 +5,7 @@ use crate::retime::MotionProfile;
 use crate::robot::RobotModel;
 
 use super::limits::{ROUNDING, needed_slow_down};
-use super::{CommandError, CommandRow, CommandTable, SampleOptions, end_point};
+use super::{CommandError, CommandRow, CommandTable, SampleOptions, end_point, tracked};
 
 /// A replay that ends farther from the plan's end is corrected, m; half of what the certificate allows.
 pub const CORRECT_BEYOND: f64 = 0.5e-3;
@@ -18,10 +18,19 @@ const MOST_ROWS: f64 = 2e6;
 /// Slow-downs before giving up.
 const ATTEMPTS: usize = 60;
 
+/// Positions off at the rows as a share of those of `mean`, per second of sampling time: what `tracked` aims at first, and then. In
+/// proportion to the sampling time, so that they fall with its third power.
+const CLOSENESS: [f64; 2] = [0.2, 1.0];
+/// The share that is no reason to slow down.
+const CLOSE: f64 = 0.1;
+/// A slow-down that corrections of `tracked` are worth: the most that they can need if nothing else is wrong.
+const WORTH: f64 = 1.034;
+
 /// Samples a profile into held commands.
 ///
 /// The profile is slowed down uniformly, in whole rows and by no more than needed, until the table *as written* keeps every limit, and
-/// until its replay, corrected where it must be, ends within 0.5 mm of the profile's end.
+/// until its replay, corrected where it must be, ends within 0.5 mm of the profile's end; with `tracked` within 1 um. Where `tracked`
+/// finds no correction, the table is that of `mean`, and says so.
 ///
 /// # Errors
 /// [`CommandError`]: a sampling time that is no such, too many rows, or no slow-down within reason helps.
@@ -30,6 +39,13 @@ pub fn sample(
     robot: &RobotModel,
     options: &SampleOptions,
 ) -> Result<CommandTable, CommandError> {
+    if options.sampling == Sampling::Tracked {
+        let mean = SampleOptions { sampling: Sampling::Mean, ..*options };
+        return match sample_tracked(profile, robot, &mean)? {
+            Some(table) => Ok(table),
+            None => sample(profile, robot, &mean),
+        };
+    }
     let hold = options.sampling_time;
     let mut rows = rows_of(profile, options)?;
     let mut slow_down = 1.0;
@@ -67,6 +83,41 @@ pub fn sample(
     })
 }
 
+/// The corrected table of the least slow-down, from the options of the means; where none is close enough within what a slow-down is worth,
+/// the first that ends as promised within its limits. `None`: not even that.
+fn sample_tracked(
+    profile: &MotionProfile,
+    robot: &RobotModel,
+    mean: &SampleOptions,
+) -> Result<Option<CommandTable>, CommandError> {
+    let mut rows = rows_of(profile, mean)?;
+    let mut most = MOST_ROWS;
+    let mut second_best = None;
+    for _ in 0..ATTEMPTS {
+        if rows > most {
+            break;
+        }
+        let table = uncorrected(profile, robot, mean, rows as usize);
+        let slow_down = needed_slow_down(&table, robot);
+        if slow_down <= 1.0 {
+            for closeness in CLOSENESS {
+                let aim = (closeness * mean.sampling_time).min(CLOSE);
+                let mut corrected = CommandTable { sampling: Sampling::Tracked, ..table.clone() };
+                let Some(share) = tracked::correct(&mut corrected, robot, aim) else { continue };
+                if needed_slow_down(&corrected, robot) <= 1.0 {
+                    if share <= CLOSE {
+                        return Ok(Some(corrected));
+                    }
+                    second_best.get_or_insert(corrected);
+                }
+            }
+            most = most.min((rows * WORTH).max(rows + 2.0));
+        }
+        rows = (rows + 1.0).max((rows * slow_down * (1.0 - ROUNDING)).ceil());
+    }
+    Ok(second_best)
+}
+
 /// Samples a profile without slow-down and without correction: what the sampling alone does to a path.
 ///
 /// # Errors
@@ -77,6 +128,9 @@ pub fn sample_uncorrected(
     options: &SampleOptions,
 ) -> Result<CommandTable, CommandError> {
     let rows = rows_of(profile, options)?;
+    // What `tracked` corrects are means.
+    let sampling = if options.sampling == Sampling::Tracked { Sampling::Mean } else { options.sampling };
+    let options = &SampleOptions { sampling, ..*options };
     if rows > MOST_ROWS {
         let hold = options.sampling_time;
         return Err(CommandError::TooLong { time: rows * hold, sampling_time: hold, rows });
@@ -89,9 +143,6 @@ fn rows_of(profile: &MotionProfile, options: &SampleOptions) -> Result<f64, Comm
     let hold = options.sampling_time;
     if !(hold.is_finite() && hold > 0.0) {
         return Err(CommandError::SamplingTime { sampling_time: hold });
-    }
-    if options.sampling == Sampling::Tracked {
-        return Err(CommandError::NotYet);
     }
     Ok((profile.rounded_up(hold).time() / hold).round())
 }

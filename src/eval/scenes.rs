@@ -49,7 +49,7 @@ pub struct Scene {
 }
 
 impl SceneSet {
-    /// What a scene asks, as a mission without a map file: sampling time 0.1 s, time law `auto`, mean sampling.
+    /// What a scene asks, as a mission without a map file: sampling time 0.1 s, time law `auto`, default sampling.
     pub fn mission(&self, scene: &Scene) -> Mission {
         Mission {
             name: scene.id.clone(),
@@ -60,11 +60,12 @@ impl SceneSet {
             path: None,
             clearance: self.clearance,
             sampling_time: SAMPLING_TIME,
-            sampling: Sampling::Mean,
+            sampling: Sampling::DEFAULT,
             time_law: TimeLaw::Auto,
             reverse: self.reverse,
             parameterisation: Parameterisation::DEFAULT,
             path_error_times: Vec::new(),
+            path_error_samplings: Vec::new(),
             limits: self.limits.clone(),
             source: Default::default(),
             spans: Default::default(),

@@ -56,8 +56,8 @@ pub(super) static MISSION: [Field; 14] = [
     Field::optional(
         "sampling",
         Shape::Choice(&SAMPLING),
-        "mean",
-        "how wheel speeds become held commands; default mean",
+        "tracked",
+        "how wheel speeds become held commands; default tracked: their replay passes the planned positions",
     ),
     Field::optional(
         "time_law",
@@ -146,14 +146,7 @@ pub(super) static POSE: [Field; 4] = [
 
 static UNKNOWN: [Choice; 2] = [Choice::now("occupied"), Choice::now("free")];
 
-static SAMPLING: [Choice; 3] = [
-    Choice::now("mean"),
-    Choice::now("instant"),
-    Choice::later(
-        "tracked",
-        "a later version will have it; use `mean`, which keeps wheels, joints and heading in time",
-    ),
-];
+static SAMPLING: [Choice; 3] = [Choice::now("tracked"), Choice::now("mean"), Choice::now("instant")];
 
 static TIME_LAW: [Choice; 7] = [
     Choice::now("auto"),
@@ -194,7 +187,7 @@ pub(super) static PATH: [Field; 2] = [
 
 /// What the words of `sampling` stand for.
 pub(super) static SAMPLING_LAWS: [(&str, Sampling); 3] =
-    [("mean", Sampling::Mean), ("instant", Sampling::Instant), ("tracked", Sampling::Tracked)];
+    [("tracked", Sampling::Tracked), ("mean", Sampling::Mean), ("instant", Sampling::Instant)];
 
 /// What the words of `time_law` stand for.
 pub(super) static TIME_LAWS: [(&str, TimeLaw); 7] = [

@@ -39,6 +39,8 @@ pub struct Mission {
     pub parameterisation: Parameterisation,
     /// Sampling times of the path-error report, seconds, ascending.
     pub path_error_times: Vec<f64>,
+    /// Samplings that it is reported for: the mission's own, unless somebody asks for others.
+    pub path_error_samplings: Vec<Sampling>,
     /// Overrides of the robot's limits.
     pub limits: LimitsSpec,
     /// The text it was read from.
@@ -134,12 +136,17 @@ pub enum PathSpec {
 /// How wheel speeds become held commands; `MATH` section 8.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sampling {
-    /// Travel over the interval divided by its length.
+    /// Travel over the interval divided by its length: wheels, joints and heading are where they should be at every row.
     Mean,
-    /// The speed at the interval's start.
+    /// The speed at the interval's start, as in \[CONV\].
     Instant,
-    /// Corrected on the replay (a later issue).
+    /// `Mean`, corrected on the replay: positions are where they should be at every row, heading and joints at the end.
     Tracked,
+}
+
+impl Sampling {
+    /// Where nobody asks for another.
+    pub const DEFAULT: Self = Self::Tracked;
 }
 
 /// How a path is timed.

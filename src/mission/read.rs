@@ -33,6 +33,7 @@ pub(super) fn parse(name: &str, text: &str) -> Result<Mission, Diagnostics> {
     let stem = Path::new(name).file_stem().map(|s| s.to_string_lossy().into_owned());
     let word = |key: &str| root.get(key).and_then(Node::text);
     let time_law = pick(&TIME_LAWS, word("time_law")).unwrap_or(TimeLaw::Auto);
+    let sampling = pick(&SAMPLING_LAWS, word("sampling")).unwrap_or(Sampling::DEFAULT);
     Ok(Mission {
         name: stem.unwrap_or_else(|| "mission".into()),
         robot: path(root.get("robot")).unwrap_or_default(),
@@ -42,12 +43,13 @@ pub(super) fn parse(name: &str, text: &str) -> Result<Mission, Diagnostics> {
         path: root.get("path").and_then(given_path),
         clearance: number("clearance_m", 0.05),
         sampling_time: number("sampling_time_s", 0.1),
-        sampling: pick(&SAMPLING_LAWS, word("sampling")).unwrap_or(Sampling::Mean),
+        sampling,
         time_law,
         reverse: root.get("reverse").and_then(Node::flag).unwrap_or(false),
         parameterisation: pick(&PARAMETERISATIONS, word("parameterisation"))
             .unwrap_or_else(|| Parameterisation::suiting(time_law)),
         path_error_times: path_error_times(&root),
+        path_error_samplings: vec![sampling],
         limits: limits::read(root.get("limits")),
         spans: spans(&source, &root),
         source,

@@ -50,7 +50,7 @@ fn what_is_left_out_takes_its_default() {
     assert_eq!((map.resolution, map.height, map.unknown, map.origin), (None, None, Unknown::Occupied, None));
     assert_eq!(mission.goal.expect("goal").yaw, None);
     assert_eq!((mission.clearance, mission.sampling_time), (0.05, 0.1));
-    assert_eq!((mission.sampling, mission.time_law, mission.reverse), (Sampling::Mean, TimeLaw::Auto, false));
+    assert_eq!((mission.sampling, mission.time_law, mission.reverse), (Sampling::Tracked, TimeLaw::Auto, false));
     assert_eq!(mission.path_error_times, [0.01, 0.02, 0.05, 0.1, 0.2, 0.5]);
     assert_eq!(mission.parameterisation, Parameterisation::DEFAULT);
     assert_eq!(mission.limits, LimitsSpec::default());

@@ -106,7 +106,7 @@ fn keys_and_values() {
     spoiled("wrong_key", 2, set("clearance_m", "clearence_m"));
     spoiled("wrong_type", 2, set("clearance_m: 0.05", "clearance_m: small"));
     spoiled("not_a_number", 2, set("x_m: 0.6", "x_m: .nan"));
-    spoiled("sampling_tracked", 2, set("sampling_time_s: 0.1", "sampling: tracked"));
+    spoiled("sampling_word", 2, set("sampling_time_s: 0.1", "sampling: traced"));
     spoiled("joint_unknown", 2, blades("x_m: 0.6, y_m: 1.5, yaw: 0, joints: {blad: 0.0}"));
     spoiled("joint_outside", 2, blades("x_m: 0.6, y_m: 1.5, yaw: 0, joints: {blade: 270deg}"));
     spoiled("joint_of_a_rigid_robot", 2, set("yaw: 0deg}\ngoal", "yaw: 0deg, joints: {blade: 1}}\ngoal"));
@@ -201,6 +201,8 @@ fn the_command_line() {
         ("usage_format", &["compile", "missions/a.yaml", "--format", "bag"]),
         ("usage_shell", &["completions", "basch"]),
         ("usage_schema", &["schema", "map"]),
+        ("usage_sampling_word", &["path-error", "missions/a.yaml", "--sampling", "midpoint"]),
+        ("usage_max_error", &["path-error", "missions/a.yaml", "--max-error", "5cm"]),
         ("usage_sampling_times", &["path-error", "missions/a.yaml", "--sampling-times", "0.1,none"]),
     ] {
         let run = sandbox.run(args).expect(2);

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::sandbox::{Sandbox, repository};
+use super::sandbox::{Sandbox, golden, repository};
 
 const MISSIONS: [&str; 7] = ["first", "c_curve", "s_curve", "arbitrary", "barn_29", "depot", "levine"];
 const FILES: [&str; 6] =
@@ -184,6 +184,32 @@ fn path_error_of_a_mission_and_of_its_command_file_agree() {
     assert!(csv.starts_with("sampling_time_s,sampling,lateral_max_m"), "{csv}");
     let table = sandbox.run(&["path-error", "missions/a.yaml", "--sampling-times", "0.1,0.2"]).expect(0).stdout;
     assert_eq!(table.lines().count(), 3, "{table}");
+}
+
+#[test]
+fn path_errors_of_all_samplings_are_told_drawn_and_turned_around() {
+    let sandbox = Sandbox::new();
+    let asked = ["--sampling-times", "0.1,0.2", "--sampling", "instant,mean,tracked", "--plot", "error.svg"];
+    let run = |more: &[&str]| {
+        let mission = mission("c_curve");
+        sandbox.run(&[&["path-error", mission.as_str()], &asked[..], more].concat()).expect(0).stdout
+    };
+    golden("path_error_of_all_samplings", &run(&[]));
+    let svg = String::from_utf8(sandbox.read("error.svg")).expect("text");
+    for text in ["instant", "mean", "tracked", "sampling time s", "error mm"] {
+        assert!(svg.contains(text), "{text}");
+    }
+    let answers = run(&["--max-error", "5mm"]);
+    let answers: Vec<&str> = answers.lines().skip(7).collect();
+    assert_eq!(answers.len(), 3, "{answers:?}");
+    let answers = run(&["--max-error", "0.02mm", "--csv"]);
+    assert_eq!(answers.lines().filter(|line| line.starts_with("# within 0.0200 mm")).count(), 3, "{answers}");
+    let json: Value = serde_json::from_str(&run(&["--max-error", "0.02mm", "--json"])).expect("JSON");
+    let largest: Vec<f64> = (0..3).map(|k| json["max_error"][k]["sampling_time_s"].as_f64().expect("a time")).collect();
+    assert!(largest[1] < largest[0] && largest[0] < largest[2], "{largest:?}");
+    for answer in json["max_error"].as_array().expect("answers") {
+        assert!(answer["at"]["lateral_max_m"].as_f64() <= Some(2e-5), "{answer}");
+    }
 }
 
 #[test]
