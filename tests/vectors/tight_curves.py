@@ -3,8 +3,8 @@
 
     python tight_curves.py FOLDER/OF/time_laws.py -o tight_curves.json        needs numpy, scipy, casadi, toppra
 
-Hairpins (0, 0), (1, 0), (1, w), (0, w) whose least radius, in the middle, is R: there |p'| = 1.5 w and the curvature is 6 / (1.5 w)^2,
-so w = sqrt(6 R) / 1.5. Solvers, robot and limits are those of time_laws.py; only the table of the curvature that its optimum reads is
+Hairpins (0, 0), (2, 0), (2, w), (0, w) whose least radius, in the middle, is R: there |p'| = 1.5 w and the curvature is 12 / (1.5 w)^2,
+so w = sqrt(12 R) / 1.5. Solvers, robot and limits are those of time_laws.py; only the table of the curvature that its optimum reads is
 finer, since a hairpin's curvature is a narrow peak.
 """
 import argparse
@@ -37,7 +37,6 @@ def limit_function(path, piece):
 
 
 def measure(path, points, intervals):
-    v = laws.V / (1 + laws.HALF * path.max_curvature)
     row = {"control_points": [points], "length": round(path.length, 6), "max_curvature": round(path.max_curvature, 6)}
     row["toppra"] = {"time": round(laws.toppra_time(path)[0], 4)}
     # The guess is a crawl: the profile in the faster wheel's travel, read off at equal times.
@@ -59,7 +58,6 @@ def measure(path, points, intervals):
         print(path.name, round(seconds, 1), "s", runs[-1], flush=True)
     runs.sort(key=lambda r: r["time"])
     row["optimum"] = {**runs[0], "other_guess_time": runs[1]["time"]}
-    row["fixed_point_speed"] = round(float(v), 6)
     return row
 
 
@@ -76,8 +74,8 @@ packages = {p: version(p) for p in ("toppra", "casadi", "numpy", "scipy")}
 document = {"source": "tight_curves.py, with the solvers of time_laws.py; " + ", ".join(f"{p} {v}" for p, v in packages.items()),
             "limits": {"track": laws.TRACK, "wheel_radius": laws.WHEEL_RADIUS, "v": laws.V, "a": laws.A, "j": laws.J}, "paths": {}}
 for radius in RADII:
-    width = round((6 * radius) ** 0.5 / 1.5, 12)
-    points = [[0.0, 0.0], [1.0, 0.0], [1.0, width], [0.0, width]]
+    width = round((12 * radius) ** 0.5 / 1.5, 12)
+    points = [[0.0, 0.0], [2.0, 0.0], [2.0, width], [0.0, width]]
     name = f"hairpin_{round(1e3 * radius)}mm"
     document["paths"][name] = measure(laws.Path(name, [points]), points, args.N)
 with open(args.output, "w") as out:
