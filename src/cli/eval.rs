@@ -89,9 +89,9 @@ impl ValueEnum for Which {
     fn to_possible_value(&self) -> Option<PossibleValue> {
         match self {
             Self::Scenes(suite) => suite.to_possible_value(),
-            Self::Curves => {
-                Some(PossibleValue::new("curves").help("The curves of [CONV] section 3, and hairpins, under every time law"))
-            }
+            Self::Curves => Some(
+                PossibleValue::new("curves").help("The curves of [CONV] section 3, and hairpins, under every time law"),
+            ),
         }
     }
 }

@@ -52,11 +52,8 @@ mod tests {
             let reached = end(&clipped(&circle(rims, 70), 0.5), start);
             let radius = 0.8 * rims[0].signum() * turn;
             let (from, to) = (start.yaw, start.yaw + turn * 0.2 / 0.4 * 7.0);
-            let expected = Pose2::new(
-                start.x + radius * (to.sin() - from.sin()),
-                start.y - radius * (to.cos() - from.cos()),
-                to,
-            );
+            let expected =
+                Pose2::new(start.x + radius * (to.sin() - from.sin()), start.y - radius * (to.cos() - from.cos()), to);
             assert!(reached.distance(expected) < 1e-12 && (reached.yaw - to).abs() < 1e-12, "{reached:?} {expected:?}");
         }
     }

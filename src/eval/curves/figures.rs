@@ -56,9 +56,7 @@ fn row(row: &Row, optimum: f64, robot: &RobotModel) -> Value {
 
 fn of_commands(figures: &Figures, optimum: f64, robot: &RobotModel) -> Value {
     let [speed, acceleration, jerk] = figures.peaks;
-    let miss = |miss: super::Miss| {
-        json!({"distance_m": miss.distance, "heading_rad": miss.angle, "missed": miss.distance > MISSED})
-    };
+    let miss = |miss: super::Miss| json!({"distance_m": miss.distance, "heading_rad": miss.angle, "missed": miss.distance > MISSED});
     json!({
         "law_taken": (!figures.taken.is_empty()).then_some(&figures.taken),
         "time_s": figures.time,

@@ -32,14 +32,8 @@ impl How {
     /// Every row of a curve: the paper's four ways, then the laws.
     pub fn all() -> Vec<Self> {
         let paper = [(false, false), (true, false), (false, true), (true, true)];
-        let laws = [
-            TimeLaw::Printed,
-            TimeLaw::Eq5,
-            TimeLaw::FixedPoint,
-            TimeLaw::Wheel,
-            TimeLaw::Optimal,
-            TimeLaw::Auto,
-        ];
+        let laws =
+            [TimeLaw::Printed, TimeLaw::Eq5, TimeLaw::FixedPoint, TimeLaw::Wheel, TimeLaw::Optimal, TimeLaw::Auto];
         let paper = paper.map(|(eq2, eq5)| Self::Paper(Printed { eq2, eq5 }));
         paper.into_iter().chain(laws.map(Self::Compiled)).collect()
     }

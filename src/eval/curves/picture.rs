@@ -49,10 +49,8 @@ fn from_above(drawn: &[(String, How, &Figures)], robot: &RobotModel) -> Option<T
         ("without Eq. 5, wheels clipped", How::Paper(Printed { eq2: false, eq5: false })),
         ("with Eq. 5, wheels clipped", How::Paper(Printed { eq2: false, eq5: true })),
     ];
-    let clipped: Vec<(&'static str, Vec<[f64; 2]>)> = clipped
-        .into_iter()
-        .filter_map(|(name, how)| Some((name, points(&clip::clipped(of(how)?, limit)))))
-        .collect();
+    let clipped: Vec<(&'static str, Vec<[f64; 2]>)> =
+        clipped.into_iter().filter_map(|(name, how)| Some((name, points(&clip::clipped(of(how)?, limit))))).collect();
     let planned: Vec<[f64; 2]> = path.rows.iter().map(|row| [row.pose.x, row.pose.y]).collect();
     let all = planned.iter().chain(clipped.iter().flat_map(|(_, points)| points));
     let mut view = TopView::around(all.copied(), MARGIN);

@@ -20,7 +20,8 @@ pub fn table(judged: &[Judged], robot: &RobotModel, held: Held) -> String {
         "  Peaks: of both wheels, as written: differences of held speeds. * over the limit, or the end point missed by more than {} mm.\n",
         1e3 * MISSED
     );
-    text += "  Clipped: a robot that clips each wheel's speed at its limit and follows the commands exactly otherwise.\n";
+    text +=
+        "  Clipped: a robot that clips each wheel's speed at its limit and follows the commands exactly otherwise.\n";
     text += "  Over: the law's own time against the optimum of an independent solver (speed, acceleration and jerk; toppra: without jerk).\n";
     text += &format!(
         "  To the letter: as the paper has it, limits broken, sampled `instant`. Compiled: slowed down until they hold, certified, `{}`.\n",
@@ -32,19 +33,8 @@ pub fn table(judged: &[Judged], robot: &RobotModel, held: Held) -> String {
 
 fn of_curve(judged: &Judged, robot: &RobotModel) -> String {
     let Curve { title, length, least_radius, optimum, lower_bound, .. } = &judged.curve;
-    let head = [
-        "",
-        "time s",
-        "over %",
-        "optimum s",
-        "toppra s",
-        "rows s",
-        "m/s ",
-        "m/s² ",
-        "m/s³ ",
-        "end mm ",
-        "clipped mm ",
-    ];
+    let head =
+        ["", "time s", "over %", "optimum s", "toppra s", "rows s", "m/s ", "m/s² ", "m/s³ ", "end mm ", "clipped mm "];
     let title = format!("{title}, {length:.3} m, least radius {least_radius:.3} m");
     let mut table = TextTable::new(title, &head);
     let limits = [robot.wheel.speed, robot.wheel.acceleration, robot.wheel.jerk];
