@@ -154,6 +154,137 @@ fn figures_five_and_six_are_compiled_drawn_and_stand_beside_the_paper() {
     }
 }
 
+/// Held rim speeds (left, right) of a command file of the robot of [CONV], m/s.
+fn rims(csv: &str) -> Vec<[f64; 2]> {
+    let rows = csv.lines().filter(|l| !l.starts_with('#')).skip(1);
+    let rim = |cell: Option<&str>| 0.1 * cell.and_then(|c| c.parse::<f64>().ok()).expect("a number");
+    rows.map(|row| row.split(',').skip(1)).map(|mut cells| [rim(cells.next()), rim(cells.next())]).collect()
+}
+
+/// Largest speed, acceleration and jerk of either wheel: differences over 0.1 s, at rest before and after.
+fn peaks(rims: &[[f64; 2]]) -> [f64; 3] {
+    let mut peaks = [0.0f64; 3];
+    for side in 0..2 {
+        let mut held: Vec<f64> = [0.0; 3].into_iter().chain(rims.iter().map(|r| r[side])).chain([0.0; 3]).collect();
+        for peak in &mut peaks {
+            *peak = held.iter().fold(*peak, |most, value| most.max(value.abs()));
+            held = held.windows(2).map(|pair| (pair[1] - pair[0]) / 0.1).collect();
+        }
+    }
+    peaks
+}
+
+/// Where a robot ends that clips its rim speeds, by small steps.
+fn driven(rims: &[[f64; 2]], [mut x, mut y, mut yaw]: [f64; 3], clip: f64) -> [f64; 2] {
+    const STEPS: usize = 400;
+    for [left, right] in rims.iter().map(|rims| rims.map(|v| v.clamp(-clip, clip))) {
+        let (step, turn) = (0.5 * (left + right) * 0.1 / STEPS as f64, (right - left) / 0.4 * 0.1 / STEPS as f64);
+        for _ in 0..STEPS {
+            let (sin, cos) = (yaw + 0.5 * turn).sin_cos();
+            (x, y, yaw) = (x + step * cos, y + step * sin, yaw + turn);
+        }
+    }
+    [x, y]
+}
+
+#[test]
+fn curves_stand_beside_the_optimum_and_what_the_paper_found_takes_the_clip_and_nothing_else() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // Left from an earlier run of a law that refuses: must not pass for this one's.
+    std::fs::create_dir_all(folder.path().join("c/hairpin_20mm")).expect("made");
+    std::fs::write(folder.path().join("c/hairpin_20mm/eq5.csv"), "old").expect("written");
+    let output = eval(&["--suite", "curves", "--json", "--write-commands", "c"], folder.path());
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let json: Value = serde_json::from_slice(&output.stdout).expect("JSON and nothing else");
+    let number = |value: &Value| value.as_f64().unwrap_or_else(|| panic!("a number, not {value}"));
+    let ids: Vec<&Value> = json["curves"].as_array().expect("a list").iter().map(|c| &c["id"]).collect();
+    assert_eq!(ids, ["c_curve", "s_curve", "arbitrary", "hairpin_100mm", "hairpin_20mm"]);
+    for curve in json["curves"].as_array().expect("a list") {
+        let id = curve["id"].as_str().expect("text");
+        let segments: Vec<[[f64; 2]; 4]> =
+            serde_json::from_value(curve["control_points_m"].clone()).expect("control points");
+        let ([from, handle, ..], [.., to]) = (segments[0], segments[segments.len() - 1]);
+        let start = [from[0], from[1], (handle[1] - from[1]).atan2(handle[0] - from[0])];
+        let rows = curve["rows"].as_array().expect("a list");
+        for row in rows {
+            let name = format!("{id}/{}.csv", row["name"].as_str().expect("text"));
+            let file = std::fs::read_to_string(folder.path().join("c").join(&name));
+            if row.get("refused").is_some() {
+                assert!(file.is_err() && row.get("peaks").is_none(), "{name}");
+                continue;
+            }
+            let rims = rims(&file.unwrap_or_else(|e| panic!("{name}: {e}")));
+            let found = peaks(&rims);
+            for (found, key) in found.iter().zip(["speed_mps", "acceleration_mps2", "jerk_mps3"]) {
+                assert!((number(&row["peaks"][key]) / found - 1.0).abs() < 1e-9, "{name}: {found} {key} in {row}");
+            }
+            for (clip, key) in [(f64::INFINITY, "end_point"), (0.5, "end_point_clipped")] {
+                let end = driven(&rims, start, clip);
+                let miss = (end[0] - to[0]).hypot(end[1] - to[1]);
+                assert!((number(&row[key]["distance_m"]) - miss).abs() < 1e-6, "{name}: {miss} in {row}");
+            }
+            let keeps = found.iter().zip([0.5, 0.2, 0.2]).all(|(peak, limit)| *peak <= limit * (1.0 + 1e-9));
+            assert_eq!(row["limits_hold"], keeps, "{name}");
+            if row["compiled"] == true {
+                assert!(keeps && number(&row["end_point_clipped"]["distance_m"]) < 1e-3, "{name}: {row}");
+                assert!(number(&row["time_s"]) > number(&curve["toppra_s"]), "{name}");
+                assert!(number(&row["over_optimum_percent"]) > -0.02, "{name}: no faster than the optimum");
+            }
+        }
+        let row = |name: &str| rows.iter().find(|r| r["name"] == name).expect("a row");
+        for law in ["optimal", "auto"] {
+            assert!(number(&row(law)["over_optimum_percent"]) <= 0.5, "{id}: {}", row(law));
+        }
+        let missed = |name: &str| ["end_point", "end_point_clipped"].map(|key| row(name)[key]["missed"] == true);
+        if curve["paper"].is_null() {
+            for law in ["eq5", "eq5_to_the_letter"] {
+                let reason = row(law)["refused"].as_str().expect("a reason");
+                assert!(reason.contains("half the track (0.2000 m)"), "{reason}");
+            }
+            continue;
+        }
+        assert_eq!(missed("uncompensated"), [false, true], "{id}");
+        assert_eq!(missed("eq5_to_the_letter"), [false, false], "{id}");
+        assert_eq!(row("eq5_to_the_letter")["limits_hold"], false, "{id}: Eq. 5 guards speed alone");
+    }
+}
+
+#[test]
+fn curves_are_printed_with_the_reasons_of_laws_that_refuse_and_drawn() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = |plots: &str| {
+        let output = eval(&["--suite", "curves", "--plot", plots], folder.path());
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        text(&output.stdout)
+    };
+    let table = run("p");
+    for expected in [
+        "paper, without Eq. 5 (Fig. 2, 4)",
+        "compiled, auto (optimal)",
+        "refused: time law `printed` needs a given path of one cubic",
+        "refused: time law `eq5` leaves",
+        "picture: p/hairpin_20mm.svg",
+    ] {
+        assert!(table.contains(expected), "{expected} in {table}");
+    }
+    assert!(!table.contains("NaN"), "{table}");
+    // Each table says how its curve is driven without and with compensation, in rows as wide as its head.
+    let rows = |start: &str| table.lines().filter(|l| l.trim_start().starts_with(start)).count();
+    assert_eq!([rows("uncompensated  "), rows("compiled, optimal"), rows("limit  ")], [5, 5, 5]);
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+    for (curve, traces) in [("c_curve", 2), ("hairpin_100mm", 1)] {
+        let file = read(&format!("p/{curve}.svg"));
+        let tree = roxmltree::Document::parse(&file).expect("well-formed");
+        let texts: Vec<&str> = tree.descendants().filter(|n| n.has_tag_name("text")).filter_map(|n| n.text()).collect();
+        assert_eq!(texts.iter().filter(|t| t.ends_with("Eq. 5, wheels clipped")).count(), traces, "{curve}");
+        let laws = texts.iter().filter(|t| t.starts_with("compiled, ") && t.ends_with(" s")).count();
+        assert_eq!(laws, if traces == 2 { 6 } else { 5 }, "{curve}: a chart for each law that does not refuse");
+    }
+    let first = read("p/s_curve.svg");
+    run("again");
+    assert!(first == read("again/s_curve.svg"), "the same bytes");
+}
+
 #[test]
 fn a_scene_that_failed_is_drawn_with_its_reason() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -182,6 +313,9 @@ fn bad_input_ends_with_two_and_says_what_to_do() {
         (&["--suite", "table1", "--boxes", "10"], "`--boxes` is for table3"),
         (&["--suite", "fig5", "--seed", "2"], "fig5 is one fixed scene"),
         (&["--suite", "fig6", "--count", "3"], "fig6 is one fixed scene"),
+        (&["--suite", "curves", "--count", "3"], "`--count` has no meaning there"),
+        (&["--suite", "curves", "--robot", ROBOT, "--profile"], "leave `--profile` out"),
+        (&["--suite", "curves", "--plot", "good.json"], "cannot make folder `good.json`"),
         (&["--suite", "fig6", "--plot", "good.json"], "cannot make folder `good.json`"),
         (&["--suite", "table3", "--boxes", "0"], "1..=60"),
         (&["--suite", "table3", "--count", "0"], "1..=5000"),

@@ -1,8 +1,11 @@
 //! `trajc eval`.
 
+mod curves;
+
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
+use clap::{ValueEnum, builder::PossibleValue};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::inputs::{self, Disk};
@@ -23,9 +26,10 @@ use crate::robot::{self, Files, RobotInputs, RobotModel, spec};
 #[derive(Debug, clap::Args)]
 #[command(group(clap::ArgGroup::new("what").required(true).args(["suite", "scenes"])))]
 pub struct EvalArgs {
-    /// Draw the scenes of this table of [SCR]; fig5 and fig6: the one scene of a figure.
+    /// Draw the scenes of this table of [SCR]; fig5 and fig6: the one scene of a figure; curves: the paths of [CONV] section 3 and
+    /// tighter ones under every time law.
     #[arg(long)]
-    suite: Option<Suite>,
+    suite: Option<Which>,
     /// Read the scenes from a file.
     #[arg(long, value_name = "FILE.json")]
     scenes: Option<PathBuf>,
@@ -48,11 +52,12 @@ pub struct EvalArgs {
     /// Also write the suite's scenes to a file.
     #[arg(long, value_name = "FILE.json", conflicts_with = "scenes")]
     write_scenes: Option<PathBuf>,
-    /// Write DIR/ID/commands.csv and report.json of each certified scene.
+    /// Write DIR/ID/commands.csv and report.json of each certified scene; of curves DIR/ID/LAW.csv.
     #[arg(long, value_name = "DIR")]
     write_commands: Option<PathBuf>,
     /// Draw each scene as DIR/ID.svg: from above, obstacles, path and robot; below, joints and wheels over time [default: out for
-    /// fig5 (fig5.svg, and fig5-spins.svg with turns on the spot) and fig6 (fig6.svg); nothing is drawn for others].
+    /// fig5 (fig5.svg, and fig5-spins.svg with turns on the spot) and fig6 (fig6.svg); nothing is drawn for others]. A curve: the path,
+    /// where clipped wheels lead, and the wheels under every law.
     #[arg(long, value_name = "DIR")]
     plot: Option<PathBuf>,
     /// Print the milliseconds of each stage too.
@@ -61,6 +66,44 @@ pub struct EvalArgs {
     /// Print figures as JSON instead of tables.
     #[arg(long)]
     json: bool,
+}
+
+/// What `--suite` names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Which {
+    /// Suites of scenes.
+    Scenes(Suite),
+    /// Paths.
+    Curves,
+}
+
+impl ValueEnum for Which {
+    fn value_variants<'a>() -> &'a [Self] {
+        const ALL: [Which; 6] = {
+            let [a, b, c, d, e] = Suite::ALL;
+            [Which::Scenes(a), Which::Scenes(b), Which::Scenes(c), Which::Scenes(d), Which::Scenes(e), Which::Curves]
+        };
+        &ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        match self {
+            Self::Scenes(suite) => suite.to_possible_value(),
+            Self::Curves => Some(
+                PossibleValue::new("curves").help("The curves of [CONV] section 3, and hairpins, under every time law"),
+            ),
+        }
+    }
+}
+
+impl EvalArgs {
+    /// The suite of scenes that was asked for.
+    fn scene_suite(&self) -> Option<Suite> {
+        match self.suite {
+            Some(Which::Scenes(suite)) => Some(suite),
+            Some(Which::Curves) | None => None,
+        }
+    }
 }
 
 /// Robots that suites run with where none is named: name, robot.yaml, URDF.
@@ -74,6 +117,9 @@ const BOX_BASE: [&str; 3] =
 /// # Errors
 /// Bad input: scenes, robot, or a folder that cannot be written.
 pub fn eval(args: &EvalArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics> {
+    if args.suite == Some(Which::Curves) {
+        return curves::eval(args, terminal);
+    }
     let disk = Disk::default();
     let (set, text) = scenes(args, &disk)?;
     let suite = Suite::of(&set);
@@ -131,7 +177,7 @@ pub fn eval(args: &EvalArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics>
 /// The set, and the text it was read from.
 fn scenes(args: &EvalArgs, disk: &Disk) -> Result<(SceneSet, TextFile), Diagnostics> {
     let count = args.count.map(|n| n as usize);
-    let text = match (&args.scenes, args.suite) {
+    let text = match (&args.scenes, args.scene_suite()) {
         (Some(path), _) => {
             if std::fs::metadata(path).is_ok_and(|m| m.len() > eval::LONGEST as u64) {
                 let message = format!("scenes of more than {} MiB", eval::LONGEST >> 20);

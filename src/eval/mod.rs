@@ -1,9 +1,10 @@
 //! `trajc eval`: many scenes through the whole pipeline, and the papers' tables beside.
 //!
 //! [`document`] makes the suites of \[SCR\] section VI, [`read()`] reads `trajc.scenes/1`, [`judge`] compiles one scene,
-//! [`tables`] prints what came out beside the paper's own rows, [`figures`] says it in JSON.
+//! [`tables`] prints what came out beside the paper's own rows, [`figures`] says it in JSON. [`curves`]: the paths of \[CONV\] section 3.
 
 mod bound;
+pub mod curves;
 mod excess;
 mod fault;
 mod figure_tables;

@@ -4,15 +4,24 @@
 pub(super) struct TextTable {
     title: String,
     rows: Vec<Vec<String>>,
+    /// Texts in place of cells, by the row they stand in.
+    remarks: Vec<(usize, String)>,
 }
 
 impl TextTable {
     pub fn new(title: impl Into<String>, head: &[&str]) -> Self {
-        Self { title: title.into(), rows: vec![head.iter().map(|h| (*h).to_owned()).collect()] }
+        let head = head.iter().map(|h| (*h).to_owned()).collect();
+        Self { title: title.into(), rows: vec![head], remarks: Vec::new() }
     }
 
     pub fn row(&mut self, name: impl Into<String>, cells: impl IntoIterator<Item = String>) {
         self.rows.push(std::iter::once(name.into()).chain(cells).collect());
+    }
+
+    /// A row of one text, which no column has to be as wide as.
+    pub fn remark(&mut self, name: impl Into<String>, text: impl Into<String>) {
+        self.remarks.push((self.rows.len(), text.into()));
+        self.row(name, []);
     }
 
     pub fn render(&self) -> String {
@@ -20,11 +29,14 @@ impl TextTable {
         let width = |c: usize| self.rows.iter().filter_map(|r| r.get(c)).map(|t| t.chars().count()).max().unwrap_or(0);
         let widths: Vec<usize> = (0..columns).map(width).collect();
         let mut text = format!("{}\n", self.title);
-        for row in &self.rows {
+        for (r, row) in self.rows.iter().enumerate() {
             let mut line = String::from(" ");
             for (c, cell) in row.iter().enumerate() {
                 let pad = " ".repeat(widths[c] - cell.chars().count());
                 line += &if c == 0 { format!(" {cell}{pad}") } else { format!("  {pad}{cell}") };
+            }
+            if let Some((_, remark)) = self.remarks.iter().find(|(at, _)| *at == r) {
+                line += &format!("  {remark}");
             }
             text += line.trim_end();
             text.push('\n');
@@ -41,6 +53,14 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_remark_widens_no_column() {
+        let mut table = TextTable::new("T", &["", "a"]);
+        table.remark("none", "a long reason");
+        table.row("some", [fixed(1.0, 1)]);
+        assert_eq!(table.render(), "T\n          a\n  none  a long reason\n  some  1.0\n");
+    }
 
     #[test]
     fn columns_line_up() {

@@ -107,15 +107,25 @@ fn convolved(
     uncompensated: f64,
     task: Task<'_>,
 ) -> TimedLeg {
-    let leg = TimedLeg {
+    slowed(unslowed(curved, law, clock, limits, uncompensated), task, Scope::Actuators)
+}
+
+/// A convolution profile along a curve as it is, whatever the wheels are asked for.
+pub(super) fn unslowed(
+    curved: &Curved,
+    law: TimeLaw,
+    clock: fn(Convolution) -> Clock,
+    limits: [f64; 3],
+    uncompensated: f64,
+) -> TimedLeg {
+    TimedLeg {
         course: Course::Curved(curved.clone()),
         clock: clock(Convolution::fastest(curved.curve.length(), limits)),
         stretch: 1.0,
         law: Some(law),
         speed_limit: limits[0],
         compensation: uncompensated - limits[0],
-    };
-    slowed(leg, task, Scope::Actuators)
+    }
 }
 
 /// The fastest law that keeps every limit, the base's included.
@@ -195,19 +205,32 @@ fn corrected(
     task: Task<'_>,
 ) -> Result<TimedLeg, RetimeError> {
     let [v, a, j] = centre_limits(task.robot);
-    let uncorrected = convolved(curved, law, clock, [v, a, j], v, task);
-    let breaks: Vec<f64> = uncorrected.breaks().iter().map(|t| t / uncorrected.stretch).collect();
-    let at_full_speed = TimedLeg { stretch: 1.0, ..uncorrected };
+    let left = left_by_eq5(curved, law, clock, task)?;
+    Ok(convolved(curved, law, clock, [left, a, j], v, task))
+}
+
+/// v' of \[CONV\] Eq. 5, applied once, m/s.
+///
+/// # Errors
+/// Nothing is left.
+pub(super) fn left_by_eq5(
+    curved: &Curved,
+    law: TimeLaw,
+    clock: fn(Convolution) -> Clock,
+    task: Task<'_>,
+) -> Result<f64, RetimeError> {
+    let limits = centre_limits(task.robot);
+    let uncorrected = unslowed(curved, law, clock, limits, limits[0]);
     let mut rates = Vec::new();
-    let compensation = peaks(&breaks, true, |t, out| {
+    let compensation = peaks(&uncorrected.breaks(), true, |t, out| {
         rates.clear();
-        at_full_speed.rates(t, &mut rates);
+        uncorrected.rates(t, &mut rates);
         out.push([0.5 * (rates[1][0] - rates[0][0]), 0.0, 0.0]);
     })
     .rates[0][0];
     let wheel_speed = task.robot.wheel.planning()[0];
-    let left = v.min(wheel_speed - compensation);
-    if left <= LEAST_SPEED * v {
+    let left = limits[0].min(wheel_speed - compensation);
+    if left <= LEAST_SPEED * limits[0] {
         return Err(RetimeError::CompensationLeavesNoSpeed {
             law: super::law_key(law),
             leg: task.leg,
@@ -216,7 +239,7 @@ fn corrected(
             left: wheel_speed - compensation,
         });
     }
-    Ok(convolved(curved, law, clock, [left, a, j], v, task))
+    Ok(left)
 }
 
 /// The centre's cruise at which the faster wheel just keeps its limit where the curve bends most,

@@ -11,6 +11,7 @@ pub mod limits;
 pub mod metric;
 pub mod optimal;
 pub mod peaks;
+pub mod printed;
 pub mod profile;
 pub mod steered;
 pub mod timed_leg;
@@ -188,24 +189,7 @@ pub fn retime(
     }
     let own_timing = trajectory.source == TrajectorySource::Optimised;
     let legs = trajectory.legs.iter().enumerate().map(|(leg, what)| {
-        let joints = match what {
-            Leg::Drive(d) => d.curve.pieces.first().map_or(2, |p| p.coefficients.len()).saturating_sub(2),
-            Leg::Still(s) if s.joints_from.len() == s.joints_to.len() => s.joints_from.len(),
-            Leg::Still(s) => s.joints_from.len().max(s.joints_to.len()),
-            Leg::Steer(s) => s.curve.pieces.first().map_or(2, |p| p.coefficients.len()).saturating_sub(2),
-        };
-        if joints != robot.joints.len() {
-            return Err(RetimeError::Joints { leg, found: joints, expected: robot.joints.len() });
-        }
-        let course = match what {
-            Leg::Drive(drive) => {
-                Course::drive(drive, robot.track_width).map_err(|error| RetimeError::Curve { leg, error })?
-            }
-            Leg::Still(still) => Course::still(still, robot.track_width),
-            Leg::Steer(steer) => {
-                Course::steer(steer, robot.track_width).map_err(|error| RetimeError::Curve { leg, error })?
-            }
-        };
+        let course = course(what, leg, robot)?;
         time_leg(&course, options.law, Task { robot, hold, own_timing, one_segment, leg })
     });
     let legs = legs.collect::<Result<Vec<_>, _>>()?;
@@ -213,6 +197,24 @@ pub fn retime(
         return Err(RetimeError::Empty);
     }
     Ok(MotionProfile::new(legs, options.law, hold))
+}
+
+/// What a leg (the one of this index) does.
+fn course(what: &Leg, leg: usize, robot: &RobotModel) -> Result<Course, RetimeError> {
+    let joints = match what {
+        Leg::Drive(d) => d.curve.pieces.first().map_or(2, |p| p.coefficients.len()).saturating_sub(2),
+        Leg::Still(s) if s.joints_from.len() == s.joints_to.len() => s.joints_from.len(),
+        Leg::Still(s) => s.joints_from.len().max(s.joints_to.len()),
+        Leg::Steer(s) => s.curve.pieces.first().map_or(2, |p| p.coefficients.len()).saturating_sub(2),
+    };
+    if joints != robot.joints.len() {
+        return Err(RetimeError::Joints { leg, found: joints, expected: robot.joints.len() });
+    }
+    match what {
+        Leg::Drive(drive) => Course::drive(drive, robot.track_width).map_err(|error| RetimeError::Curve { leg, error }),
+        Leg::Still(still) => Ok(Course::still(still, robot.track_width)),
+        Leg::Steer(steer) => Course::steer(steer, robot.track_width).map_err(|error| RetimeError::Curve { leg, error }),
+    }
 }
 
 fn is_one_cubic(legs: &[Leg]) -> bool {

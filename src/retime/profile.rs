@@ -42,6 +42,11 @@ struct Local {
 impl MotionProfile {
     /// Joins timed legs; the duration is rounded up to a multiple of `hold`, at least one.
     pub(super) fn new(legs: Vec<TimedLeg>, law: TimeLaw, hold: f64) -> Self {
+        Self::unrounded(legs, law).rounded_up(hold)
+    }
+
+    /// Joins timed legs; lasts as long as they do.
+    pub(super) fn unrounded(legs: Vec<TimedLeg>, law: TimeLaw) -> Self {
         let (mut starts, mut travel) = (vec![0.0], vec![[0.0; 2]]);
         for (i, leg) in legs.iter().enumerate() {
             starts.push(starts[i] + leg.duration());
@@ -49,7 +54,7 @@ impl MotionProfile {
             travel.push([travel[i][0] + of_leg[0], travel[i][1] + of_leg[1]]);
         }
         let time = starts[legs.len()];
-        Self { legs: legs.into(), starts: starts.into(), travel: travel.into(), law, time }.rounded_up(hold)
+        Self { legs: legs.into(), starts: starts.into(), travel: travel.into(), law, time }
     }
 
     /// Duration, s.

@@ -81,6 +81,12 @@ impl TopView {
         self.add(Item::Line(points, paint), paint, name);
     }
 
+    /// Another way through these points, dashed, in the colour of this index.
+    pub fn trace(&mut self, points: Vec<[f64; 2]>, colour: usize, name: &'static str) {
+        let paint = Paint::line(COLOURS[colour % COLOURS.len()], 1.8).dashed(["7 3", "2 2"][colour % 2]);
+        self.add(Item::Line(points, paint), paint, name);
+    }
+
     /// The robot's outline at a pose with joint values `q`: base and what joints move in two colours.
     pub fn robot(&mut self, robot: &RobotModel, pose: Pose2, q: &[f64]) {
         for Part { outline, fixed } in outline::of_robot(robot, pose, q) {
