@@ -114,17 +114,21 @@ fn length(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A small length with its unit: mm, below 0.1 mm um.
+fn small(length: f64) -> String {
+    if length < 1e-4 { format!("{:.3} um", length * 1e6) } else { format!("{:.4} mm", length * 1e3) }
+}
+
 /// The answer to `--max-error` in words.
 fn sentence(answer: &Within, comment: bool) -> String {
-    let mm = |v: f64| format!("{:.4} mm", v * 1e3);
     let error = |row: &crate::report::path_error::PathErrorRow| {
         let what = if row.lateral_max >= row.end_point { "beside the path" } else { "from its end" };
-        format!("{} {what}", mm(row.largest()))
+        format!("{} {what}", small(row.largest()))
     };
     let mut out = format!(
         "{}within {} ({}): ",
         if comment { "# " } else { "" },
-        mm(answer.bound),
+        small(answer.bound),
         names::sampling(answer.sampling)
     );
     match &answer.row {
@@ -188,16 +192,15 @@ fn of_mission(
 fn table(rows: &[PathErrorRow]) -> String {
     let mut out =
         "sampling time  sampling   lateral max   lateral rms     end point   end heading    clearance\n".to_owned();
-    let mm = |v: f64| format!("{:.4} mm", v * 1e3);
     for row in rows {
         let clearance = row.clearance_min_m.map_or("-".to_owned(), |c| format!("{:.1} mm", c * 1e3));
         out += &format!(
             "{:>11} s  {:<8} {:>13} {:>13} {:>13} {:>9.4} deg {:>12}\n",
             row.sampling_time_s,
             row.sampling,
-            mm(row.lateral_max_m),
-            mm(row.lateral_rms_m),
-            mm(row.end_point_m),
+            small(row.lateral_max_m),
+            small(row.lateral_rms_m),
+            small(row.end_point_m),
             row.end_heading_rad.to_degrees(),
             clearance
         );

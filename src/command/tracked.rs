@@ -115,14 +115,13 @@ fn weights(table: &CommandTable, robot: &RobotModel, base: &[[f64; 2]]) -> Vec<R
         Row { by_heading: [0.0; 2], by_wheel: [[0.0; 2]; 2], drift: [0.0; 2], wheels: [[0.0; 3]; 2], twist: [0.0; 2] };
     let mut rows = vec![nothing; base.len()];
     let limits = bounds(&robot.wheel, table, base);
-    for side in 0..2 {
-        let speed = |k: usize| base[k][side];
-        let (mut last, mut before) = (0.0, 0.0);
-        for (k, row) in rows.iter_mut().enumerate() {
-            let differences = [speed(k), speed(k) - last, speed(k) - 2.0 * last + before];
-            row.wheels[side] = [0, 1, 2].map(|order| weight(differences[order], limits[order]));
-            (before, last) = (last, speed(k));
-        }
+    let (mut last, mut before) = ([0.0; 2], [0.0; 2]);
+    for (row, now) in rows.iter_mut().zip(base) {
+        row.wheels = [0, 1].map(|side| {
+            let differences = [now[side], now[side] - last[side], now[side] - 2.0 * last[side] + before[side]];
+            [0, 1, 2].map(|order| weight(differences[order], limits[order]))
+        });
+        (before, last) = (last, *now);
     }
     for (row, [left, right]) in rows.iter_mut().zip(base) {
         let least = LEAST_ROOM * LEAST_ROOM * limits[0];

@@ -203,7 +203,7 @@ fn path_errors_of_all_samplings_are_told_drawn_and_turned_around() {
     let answers: Vec<&str> = answers.lines().skip(7).collect();
     assert_eq!(answers.len(), 3, "{answers:?}");
     let answers = run(&["--max-error", "0.02mm", "--csv"]);
-    assert_eq!(answers.lines().filter(|line| line.starts_with("# within 0.0200 mm")).count(), 3, "{answers}");
+    assert_eq!(answers.lines().filter(|line| line.starts_with("# within 20.000 um")).count(), 3, "{answers}");
     let json: Value = serde_json::from_str(&run(&["--max-error", "0.02mm", "--json"])).expect("JSON");
     let largest: Vec<f64> = (0..3).map(|k| json["max_error"][k]["sampling_time_s"].as_f64().expect("a time")).collect();
     assert!(largest[1] < largest[0] && largest[0] < largest[2], "{largest:?}");

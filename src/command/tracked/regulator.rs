@@ -207,10 +207,10 @@ mod tests {
             let (mut off, mut heading, mut sum) = ([0.0; 2], 0.0, 0.0);
             for (k, row) in rows.iter().enumerate() {
                 let k = k as isize;
-                for d in 0..2 {
+                off = [0, 1].map(|d| {
                     let wheels: f64 = (0..2).map(|wheel| row.by_wheel[wheel][d] * correction(k, wheel)).sum();
-                    off[d] += row.by_heading[d] * heading + wheels + row.drift[d];
-                }
+                    off[d] + row.by_heading[d] * heading + wheels + row.drift[d]
+                });
                 heading += turn * (correction(k, 1) - correction(k, 0));
                 let weight = if k as usize + 1 < rows.len() { position } else { end.0[0] };
                 sum += weight * (off[0] * off[0] + off[1] * off[1]);
@@ -219,9 +219,9 @@ mod tests {
                 sum += (0..2).map(|wheel| row.wheels[wheel][0] * correction(k, wheel).powi(2)).sum::<f64>();
             }
             for k in 0..rows.len() as isize + 2 {
-                for wheel in 0..2 {
+                for (wheel, at_rest) in rest.iter().enumerate() {
                     let weights =
-                        rows.get(k as usize).map_or(rest[wheel], |row| [row.wheels[wheel][1], row.wheels[wheel][2]]);
+                        rows.get(k as usize).map_or(*at_rest, |row| [row.wheels[wheel][1], row.wheels[wheel][2]]);
                     let [now, last, before] = [0, 1, 2].map(|back| correction(k - back, wheel));
                     let first = if k as usize > rows.len() { 0.0 } else { weights[0] * (now - last).powi(2) };
                     sum += first + weights[1] * (now - 2.0 * last + before).powi(2);
@@ -250,8 +250,8 @@ mod tests {
         let half = DVector::from_fn(size, |i, _| 0.5 * (alone[i] - nothing - matrix[(i, i)]));
         let expected = matrix.lu().solve(&-half).expect("regular");
         for (k, pair) in found.iter().enumerate() {
-            for wheel in 0..2 {
-                assert!((pair[wheel] - expected[2 * k + wheel]).abs() < 1e-7, "{k}: {pair:?} {expected}");
+            for (wheel, one) in pair.iter().enumerate() {
+                assert!((one - expected[2 * k + wheel]).abs() < 1e-7, "{k}: {pair:?} {expected}");
             }
         }
     }

@@ -16,12 +16,13 @@ use super::penalty::clearance::{ClearancePenalty, DistanceField};
 use crate::math::poly::{Piece, PiecewisePoly};
 use crate::robot::RobotModel;
 use crate::search::{SearchMove, SearchPath};
+use crate::trajectory::steered_curve::SteeredCurve;
 use crate::trajectory::{Ending, Leg, OptimiserOutcome, SteerLeg, StillLeg, Trajectory, TrajectorySource};
 
 use guess::guess;
 use layout::Layout;
 use problem::{Problem, Weights};
-use solver::{Solved, SolverOptions, solve};
+use solver::{Solved, SolverOptions, close, solve};
 
 /// How to optimise heading and arc length.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,7 +79,10 @@ const FLOOR: f64 = 0.02;
 /// How often a motion that backs up is made again with a higher floor under its speed.
 const BACKING_ROUNDS: usize = 4;
 /// Largest gap that is left between pieces, m: the end point may be off by a few of them.
-const GAP_TOLERANCE: f64 = 1e-7;
+const GAP_TOLERANCE: f64 = 1e-9;
+/// How near to the goal the curve ends, m, and in how many rounds at most.
+const END_TOLERANCE: f64 = 1e-8;
+const END_ROUNDS: usize = 4;
 
 /// Smooths a path as one motion from its first state to its last.
 pub fn optimize_steered<F: DistanceField>(
@@ -132,7 +136,22 @@ pub fn optimize_steered<F: DistanceField>(
         let again = solve(&mut problem, &mut x, &solver);
         solved = Solved { iterations: solved.iterations + again.iterations, ..again };
     }
-    let leg = SteerLeg { pose: path.states[0].pose, curve: curve(layout, &x) };
+    let pose = path.states[0].pose;
+    let goal = path.states[path.states.len() - 1].pose;
+    // The samples' quadrature is off by a few micrometres over the whole way; the curve itself must end at the goal.
+    for _ in 0..END_ROUNDS {
+        let Ok(exact) = SteeredCurve::new(&SteerLeg { pose, curve: curve(layout, &x) }) else { break };
+        let end = exact.end_pose();
+        let off = [goal.x - end.x, goal.y - end.y];
+        if off[0].hypot(off[1]) <= END_TOLERANCE {
+            break;
+        }
+        let at = layout.position(layout.pieces);
+        x[at] += off[0];
+        x[at + 1] += off[1];
+        close(&mut problem, &mut x, GAP_TOLERANCE);
+    }
+    let leg = SteerLeg { pose, curve: curve(layout, &x) };
     let ending = if solved.converged { Ending::Converged } else { Ending::IterationLimit };
     let outcome = OptimiserOutcome { pieces: layout.pieces, iterations: solved.iterations, ending, cost: solved.cost };
     trajectory(Leg::Steer(leg), outcome)

@@ -63,20 +63,7 @@ struct Merit {
 
 /// Improves `x`.
 pub(super) fn solve<F: DistanceField>(problem: &mut Problem<'_, F>, x: &mut [f64], options: &SolverOptions) -> Solved {
-    let layout = problem.layout;
-    let here = Derivatives::new(layout);
-    let mut work = Workspace {
-        factor: here.hessian.clone(),
-        there: here.clone(),
-        here,
-        step: x.to_vec(),
-        gradient: x.to_vec(),
-        product: x.to_vec(),
-        trial: x.to_vec(),
-        natural: problem.natural(),
-        multipliers: vec![[0.0; 2]; layout.pieces],
-        next_multipliers: vec![[0.0; 2]; layout.pieces],
-    };
+    let mut work = Workspace::new(problem, x);
     let mut damping = FIRST_DAMPING;
     let mut cost = problem.evaluate(x, &work.multipliers, &mut work.here);
     let mut solved = Solved { cost, iterations: 0, converged: false };
@@ -136,7 +123,31 @@ impl Merit {
     }
 }
 
+/// Closes the gaps of `x` by steps that look at nothing else.
+pub(super) fn close<F: DistanceField>(problem: &mut Problem<'_, F>, x: &mut [f64], tolerance: f64) {
+    let mut work = Workspace::new(problem, x);
+    let cost = problem.evaluate(x, &work.multipliers, &mut work.here);
+    work.close_gaps(problem, x, cost, tolerance);
+}
+
 impl Workspace {
+    fn new<F: DistanceField>(problem: &Problem<'_, F>, x: &[f64]) -> Self {
+        let layout = problem.layout;
+        let here = Derivatives::new(layout);
+        Self {
+            factor: here.hessian.clone(),
+            there: here.clone(),
+            here,
+            step: x.to_vec(),
+            gradient: x.to_vec(),
+            product: x.to_vec(),
+            trial: x.to_vec(),
+            natural: problem.natural(),
+            multipliers: vec![[0.0; 2]; layout.pieces],
+            next_multipliers: vec![[0.0; 2]; layout.pieces],
+        }
+    }
+
     /// A step from `x` to `trial`; `None` where the model has no minimum.
     fn attempt<F: DistanceField>(
         &mut self,

@@ -164,7 +164,7 @@ fn assert_motion(path: &SearchPath, leg: &SteerLeg, robot: &RobotModel) {
     let curve = SteeredCurve::new(leg).expect("sound");
     let (start, end) = (curve.pose(curve.start()), curve.end_pose());
     for (pose, wanted) in [(start, from.pose), (end, to.pose)] {
-        assert!(pose.distance(wanted) < 1e-5, "{pose:?} {wanted:?}");
+        assert!(pose.distance(wanted) < 1e-7, "{pose:?} {wanted:?}");
         assert!((pose.yaw - wanted.yaw).abs() < 1e-9);
     }
     let (poly, duration) = (&leg.curve, leg.curve.duration());

@@ -15,8 +15,8 @@ const TURN: f64 = 0.02;
 const LEAST_STEP: f64 = 1e-5;
 /// Cells of the look-up grid at most, and their least size, m.
 const GRID: (f64, f64) = (1e5, 2e-2);
-/// What a curve of the third order may be off the path by, m.
-const LEFT_OUT: f64 = 1e-11;
+/// How much of the distance may be of the fourth order, m: what is left out then is below 1e-10.
+const FOURTH_ORDER: f64 = 2e-10;
 /// A point this near to where it is looked for first is looked for nowhere else, m.
 const NEAR: f64 = 0.5e-3;
 
@@ -49,7 +49,8 @@ pub(super) struct Vertex {
 struct About {
     direction: [f64; 2],
     curvature: f64,
-    change: f64,
+    /// First and second derivative of the curvature by the distance.
+    change: [f64; 2],
 }
 
 impl PathReference {
@@ -65,7 +66,7 @@ impl PathReference {
                 let about = About {
                     direction: [x[1] / speed, y[1] / speed],
                     curvature: (x[1] * y[2] - y[1] * x[2]) / (speed * speed * speed),
-                    change: 0.0,
+                    change: [0.0; 2],
                 };
                 let about = (about.curvature.is_finite() && about.direction[0].is_finite()).then_some(about);
                 let (point, travelled) = ([x[0], y[0]], travelled + along);
@@ -168,7 +169,8 @@ impl PathReference {
                 let offset = [point[0] - vertex.point[0], point[1] - vertex.point[1]];
                 let [cos, sin] = about.direction;
                 let along = offset[0] * cos + offset[1] * sin;
-                let rise = along * along * (0.5 * about.curvature + along * about.change / 6.0);
+                let [first, second] = about.change;
+                let rise = along * along * (0.5 * about.curvature + along * (first / 6.0 + along * second / 24.0));
                 (offset[1] * cos - offset[0] * sin - rise).abs()
             }
             None => self.distance_about(nearest, point),
@@ -249,9 +251,11 @@ fn smooth_out(vertices: &mut [Vertex]) {
         let after = changes.get(k).copied().flatten().map(|change| (change, lengths[k]));
         vertex.corner = before.is_none() || after.is_none();
         vertex.about = before.zip(after).zip(vertex.about).and_then(|(((before, back), (after, ahead)), about)| {
-            // Halfway to the next vertex the fourth order is this.
-            let left_out = (after - before).abs() * back.max(ahead).powi(3) / 384.0;
-            (left_out <= LEFT_OUT).then_some(About { change: 0.5 * (before + after), ..about })
+            let second = (after - before) / (0.5 * (back + ahead));
+            let change = [before + (after - before) * back / (back + ahead), second];
+            // The fourth order halfway to the next vertex, as a measure of what is left out beyond it.
+            let fourth = second.abs() * back.max(ahead).powi(4) / 384.0;
+            (fourth <= FOURTH_ORDER).then_some(About { change, ..about })
         });
     }
 }
