@@ -233,8 +233,7 @@ impl Workspace {
             self.step.fill(0.0);
             for (piece, by) in problem.gap_jacobians(x).iter().enumerate() {
                 for (axis, by) in by.iter().enumerate() {
-                    let row =
-                        Row { piece, weight: STIFFNESS, value: self.here.gaps[piece][axis], by: by.clone() };
+                    let row = Row { piece, weight: STIFFNESS, value: self.here.gaps[piece][axis], by: by.clone() };
                     problem.pull(&row, &mut self.step);
                 }
             }
