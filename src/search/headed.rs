@@ -177,7 +177,7 @@ impl<'a, C: Fn([f64; 2]) -> f64> Headed<'a, C> {
         let own = self.spots[spot];
         let (from, to) = (self.place(own.at), [self.query.goal.x, self.query.goal.y]);
         let length = f64::from(own.to_goal);
-        let mut along = f64::from(own.room).max(LOOK[0]);
+        let mut along = f64::from(own.room).clamp(LOOK[0], LOOK[1]);
         let mut free = true;
         while along < length && free {
             let place = [0, 1].map(|a| from[a] + (to[a] - from[a]) * along / length);
@@ -476,7 +476,7 @@ mod tests {
         let straight = headed.route(0).expect("nothing there");
         assert_eq!(straight.corners, [[0.3, 1.2], [2.1, 1.2]]);
         // The first time a bend still costs more.
-        (0..3).for_each(|_| headed.avoid([1.2, 1.2]));
+        (0..5).for_each(|_| headed.avoid([1.2, 1.2]));
         let around = headed.route(0).expect("room on both sides");
         assert!(around.corners.len() > 2 && around.cost(0.0, 1.0) < 1.1 * 1.8, "{around:?}");
     }
