@@ -116,8 +116,9 @@ impl<'a, const W: usize> Solver<'a, W> {
     /// The cheapest way of metres and turns, as often as it is worth a try, and after how many that were blocked.
     fn headed(&self) -> Option<(SearchPath, usize)> {
         let Problem { map, robot, query, options, .. } = self.problem;
-        // What backing up may save is left to the others.
-        if options.reverse {
+        // What backing up may save is left to the others, and so are robots that must fold: it knows nothing of postures, and with
+        // two blades between arches its ways were blocked so often that they took longer to find and were no faster.
+        if options.reverse || !robot.joints.is_empty() {
             return None;
         }
         let (guess, least) = self.guessed_clearance();
