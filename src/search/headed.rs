@@ -215,10 +215,9 @@ impl<'a, C: Fn([f64; 2]) -> f64> Headed<'a, C> {
         let range = |d: usize| (at[d] - reach).ceil() as i32..=(at[d] + reach).floor() as i32;
         for i in range(0) {
             for j in range(1) {
-                if (f64::from(i) - at[0]).hypot(f64::from(j) - at[1]) <= reach {
-                    if let Some(spot) = self.spot([i, j]) {
-                        self.spots[spot].dear += share;
-                    }
+                let near = (f64::from(i) - at[0]).hypot(f64::from(j) - at[1]) <= reach;
+                if let Some(spot) = near.then(|| self.spot([i, j])).flatten() {
+                    self.spots[spot].dear += share;
                 }
             }
         }
