@@ -1,4 +1,4 @@
-//! A first try before the search: a route through the middle of the free space, which often passes as it is.
+//! A try before the search: a route through the middle of the free space, which often passes as it is.
 //!
 //! The lattice positions between start and goal are joined by the cheapest way in the plane, where being close to obstacles
 //! costs; its corners make a route, checked like any other. Where it is blocked the place is made expensive, and the next

@@ -10,6 +10,7 @@ mod drive;
 mod error;
 mod explain;
 mod guide;
+mod headed;
 mod heuristic;
 mod joints;
 mod lattice;

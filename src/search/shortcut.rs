@@ -3,7 +3,6 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
-use super::astar::TURN_COST;
 use super::collide::{BaseMotion, Collider};
 use super::posture::Bits;
 use super::route::{Grain, Route, drive_pieces, spin_pieces};
@@ -25,6 +24,8 @@ pub(super) struct Shortcutter<'a, const W: usize> {
     /// Whether the last turn may change: the goal leaves the heading open.
     pub open_end: bool,
     pub grain: Grain,
+    /// Metres that a radian of turning is worth.
+    pub turn_cost: f64,
     /// Free postures of the drives that were asked for.
     drives: RefCell<BTreeMap<DriveKey, Masks<W>>>,
 }
@@ -49,9 +50,15 @@ impl<const W: usize> CheckedRoute<W> {
 }
 
 impl<'a, const W: usize> Shortcutter<'a, W> {
-    pub fn new(collider: &'a Collider<'a, W>, ends: [Bits<W>; 2], open_end: bool, grain: Grain) -> Self {
+    pub fn new(
+        collider: &'a Collider<'a, W>,
+        ends: [Bits<W>; 2],
+        open_end: bool,
+        grain: Grain,
+        turn_cost: f64,
+    ) -> Self {
         let [start_postures, goal_postures] = ends;
-        Self { collider, start_postures, goal_postures, open_end, grain, drives: RefCell::default() }
+        Self { collider, start_postures, goal_postures, open_end, grain, turn_cost, drives: RefCell::default() }
     }
 
     /// Checks all pieces of a route.
@@ -205,8 +212,8 @@ impl<'a, const W: usize> Shortcutter<'a, W> {
         let turn_b =
             if at_end && self.open_end { 0.0 } else { wrap_angle(headings[b] + route.turns[b] - headings[a] - turn_a) };
         let old: f64 = (a..b).map(|k| route.cost_of_drive(k)).sum::<f64>()
-            + TURN_COST * route.turns[a..=b].iter().map(|t| t.abs()).sum::<f64>();
-        if length + TURN_COST * (turn_a.abs() + turn_b.abs()) >= old - 1e-9 {
+            + self.turn_cost * route.turns[a..=b].iter().map(|t| t.abs()).sum::<f64>();
+        if length + self.turn_cost * (turn_a.abs() + turn_b.abs()) >= old - 1e-9 {
             return None;
         }
         let drive = self.drive(from, to, headings[a] + turn_a, route.reverse[a])?;

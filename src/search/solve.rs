@@ -1,8 +1,9 @@
-//! The tries, one after the other: straight, along the guide's ways, and over the whole lattice.
+//! The tries, one after the other: straight, along the ways that count turns, along the guide's, and over the whole lattice.
 
 use super::astar::{self, AStar, Outcome};
 use super::collide::{BaseMotion, Collider};
 use super::guide::{self, Guide};
+use super::headed::{self, Headed};
 use super::heuristic::{self, Core, CostToGo};
 use super::joints;
 use super::lattice::{self, Lattice};
@@ -17,6 +18,12 @@ use crate::robot::RobotModel;
 
 /// Sweeps that are cut differently may differ by this in what they find clear, m: bulges of turns and bounds of distances.
 const CHECK_TOLERANCE: f64 = 1e-3;
+
+/// A way that counts turns is taken as it is where fewer were blocked before it.
+const SURE: usize = 2;
+/// A turn is never worth less or more than this, m a radian: whatever a robot's limits, no way wiggles, nor goes far to save a bend.
+const LEAST_TURN_COST: f64 = 0.1;
+const MOST_TURN_COST: f64 = 3.0;
 
 /// What is searched.
 #[derive(Clone, Copy)]
@@ -73,21 +80,69 @@ impl<'a, const W: usize> Solver<'a, W> {
         Ok(Self { problem, collider, lattice, core, start_postures, goal_postures })
     }
 
-    /// The first that passes of the straight ways and the guide's. None proves nothing.
+    /// The first that passes of the straight ways, those that count turns, and the guide's. None proves nothing.
     pub fn guided(&self) -> Option<SearchPath> {
-        let Problem { esdf, query, options, .. } = self.problem;
+        let Problem { query, options, .. } = self.problem;
         for route in astar::straight_to_goal(query, options) {
             if let Ok(path) = self.finish(&route, Grain::COARSE, &self.collider, 0) {
                 return Some(path);
             }
         }
-        let [x, y] = self.core.offset;
-        let guess = |place| self.core.guessed_clearance(esdf, place);
-        let mut guide = Guide::new(&self.lattice, guess, options.clearance - x.hypot(y));
+        match self.headed() {
+            Some((path, attempt)) if attempt < SURE => Some(path),
+            // What was blocked so often may have gone a long way round.
+            Some((path, _)) => {
+                let better = self.through_the_middle().filter(|other| self.estimate(other) < self.estimate(&path));
+                Some(better.unwrap_or(path))
+            }
+            None => self.through_the_middle(),
+        }
+    }
+
+    /// What a path takes, as metres of straight driving.
+    fn estimate(&self, path: &SearchPath) -> f64 {
+        let turned: f64 = path.states.windows(2).map(|w| (w[1].pose.yaw - w[0].pose.yaw).abs()).sum();
+        path.length() + turn_cost(self.problem.robot) * turned
+    }
+
+    /// The clearance of the base's core about a position, and the least with which the base may pass there, m.
+    fn guessed_clearance(&self) -> (impl Fn([f64; 2]) -> f64 + 'a, f64) {
+        let Problem { esdf, options, .. } = self.problem;
+        let core = self.core;
+        let [x, y] = core.offset;
+        (move |place| core.guessed_clearance(esdf, place), options.clearance - x.hypot(y))
+    }
+
+    /// The cheapest way of metres and turns, as often as it is worth a try, and after how many that were blocked.
+    fn headed(&self) -> Option<(SearchPath, usize)> {
+        let Problem { map, robot, query, options, .. } = self.problem;
+        // What backing up may save is left to the others, and so are robots that must fold: it knows nothing of postures, and with
+        // two blades between arches its ways were blocked so often that they took longer to find and were no faster.
+        if options.reverse || !robot.joints.is_empty() {
+            return None;
+        }
+        let (guess, least) = self.guessed_clearance();
+        let bounds = map.bounds();
+        let area = [bounds.min, bounds.max].map(|corner| [corner[0], corner[1]]);
+        let mut headed = Headed::new(query, guess, least, area, turn_cost(robot));
+        for attempt in 0..headed::TRIES {
+            let route = headed.route(attempt)?;
+            match self.finish(&route, grain_of_try(attempt), &self.collider, 0) {
+                Ok(path) => return Some((path, attempt)),
+                Err(places) => places.into_iter().for_each(|place| headed.avoid(place)),
+            }
+        }
+        None
+    }
+
+    /// The way through the middle of the free space, as often as it is worth a try.
+    fn through_the_middle(&self) -> Option<SearchPath> {
+        let Problem { query, options, .. } = self.problem;
+        let (guess, least) = self.guessed_clearance();
+        let mut guide = Guide::new(&self.lattice, guess, least);
         for attempt in 0..guide::tries(query) {
             let route = guide.route(query, options, attempt)?;
-            let grain = if attempt == 0 { Grain::COARSE } else { Grain { drive: 0.1, turn: 0.15 } };
-            match self.finish(&route, grain, &self.collider, 0) {
+            match self.finish(&route, grain_of_try(attempt), &self.collider, 0) {
                 Ok(path) => return Some(path),
                 Err(places) => places.into_iter().for_each(|place| guide.avoid(place)),
             }
@@ -155,12 +210,22 @@ impl<'a, const W: usize> Solver<'a, W> {
     ) -> Result<SearchPath, Vec<[f64; 2]>> {
         let open_end = self.problem.query.goal_yaw.is_none();
         let ends = [self.start_postures, self.goal_postures];
-        let shortcutter = Shortcutter::new(collider, ends, open_end, grain);
+        let shortcutter = Shortcutter::new(collider, ends, open_end, grain, turn_cost(self.problem.robot));
         let checked = shortcutter.shorten(shortcutter.check(route.clone())?);
         let pieces = checked.route.pieces(grain);
         let Problem { robot, query, .. } = self.problem;
         Ok(with_joints(collider, robot, query, &checked, &pieces, ends, expanded))
     }
+}
+
+/// Sweeps of a try: few at first, more where that failed.
+fn grain_of_try(attempt: usize) -> Grain {
+    if attempt == 0 { Grain::COARSE } else { Grain { drive: 0.1, turn: 0.15 } }
+}
+
+/// Metres of straight driving that take as long as a radian of turning, whatever its radius (\[SCR\] Eq. 14).
+fn turn_cost(robot: &RobotModel) -> f64 {
+    (robot.track_width / (2.0 * robot.base.eta)).clamp(LEAST_TURN_COST, MOST_TURN_COST)
 }
 
 /// Postures that are free in a pose and agree with what is asked for.
