@@ -145,7 +145,7 @@ impl PathReference {
     }
 
     /// Distance from a point to the path, m, for points in order of the distance driven, of which `cursor` remembers the last: first
-    /// looked for near there, and elsewhere only where the path is not as near as [`NEAR`].
+    /// looked for near there, and elsewhere only where the path is not as near as `NEAR`.
     pub fn distance_along(&self, point: [f64; 2], travelled: f64, cursor: &mut usize) -> f64 {
         let last = self.vertices.len() - 1;
         while *cursor < last && self.vertices[*cursor + 1].travelled <= travelled {
