@@ -28,7 +28,7 @@ use solver::{Solved, SolverOptions, close, solve};
 #[derive(Debug, Clone, PartialEq)]
 pub struct SteerOptions {
     /// Weight of the jerk (squared, relative to the wheels' and joints' jerk limits) against time; larger is smoother, and slower in
-    /// the optimiser's own timing. Default 170: a mean jerk as small as \[SCR\]'s at its limits. The time law makes up for nearly
+    /// the optimiser's own timing. Default 180: a mean jerk as small as \[SCR\]'s at its limits. The time law makes up for nearly
     /// all of it.
     pub smoothness: f64,
     /// Weight of a limit overstepped by 100 % for 1 s, s. Default 30.
@@ -49,7 +49,7 @@ pub struct SteerOptions {
 impl Default for SteerOptions {
     fn default() -> Self {
         Self {
-            smoothness: 170.0,
+            smoothness: 180.0,
             motion_weight: 30.0,
             clearance_weight: 200.0,
             sample_distance: 0.15,
