@@ -71,7 +71,6 @@ impl Straight {
 }
 
 fn take_apart(path: &SearchPath) -> (Vec<Corner>, Vec<Straight>) {
-    let first = &path.states[0];
     let corner = |at: usize| {
         let state = &path.states[at];
         Corner { position: [state.pose.x, state.pose.y], stands: vec![(state.pose.yaw, state.joints.clone())] }
@@ -110,7 +109,6 @@ fn take_apart(path: &SearchPath) -> (Vec<Corner>, Vec<Straight>) {
             }
         }
     }
-    debug_assert!(first.joints.len() == path.states[path.states.len() - 1].joints.len());
     (corners, straights)
 }
 
@@ -188,15 +186,9 @@ pub(super) fn guess(path: &SearchPath, limits: &Limits) -> Option<Guess> {
         if rounding[k].is_none() {
             let stands = kept(corner);
             let driven = corner.turn().clamp(-DRIVEN_TURN, DRIVEN_TURN);
-            let leaves = if last == 0 || !corner.is_plain() {
-                [0.0, 0.0]
-            } else if k == 0 {
-                [0.0, driven]
-            } else if k == last {
-                [driven, 0.0]
-            } else {
-                [0.0, 0.0]
-            };
+            let drives_turns = last > 0 && corner.is_plain();
+            let leaves =
+                [(last, driven), (0, driven)].map(|(end, turn)| if drives_turns && k == end { turn } else { 0.0 });
             if k > 0 && leaves[0] != 0.0 {
                 // Already there, turned by what was driven.
                 let n = nodes.len() - 1;
@@ -205,7 +197,7 @@ pub(super) fn guess(path: &SearchPath, limits: &Limits) -> Option<Guess> {
                 links[m].turn = leaves[0].abs();
             }
             for pair in stands.windows(2) {
-                let ((_, _), (mut yaw, joints)) = (at(pair[0]), at(pair[1]));
+                let (mut yaw, joints) = at(pair[1]);
                 if pair[1] + 1 == corner.stands.len() {
                     yaw -= leaves[1];
                 }

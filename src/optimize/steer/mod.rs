@@ -13,11 +13,12 @@ use super::OptimizeOptions;
 use super::contour::Contour;
 use super::penalty::Limits;
 use super::penalty::clearance::{ClearancePenalty, DistanceField};
+use super::sections::still;
 use crate::math::poly::{Piece, PiecewisePoly};
 use crate::robot::RobotModel;
 use crate::search::{SearchMove, SearchPath};
 use crate::trajectory::steered_curve::SteeredCurve;
-use crate::trajectory::{Ending, Leg, OptimiserOutcome, SteerLeg, StillLeg, Trajectory, TrajectorySource};
+use crate::trajectory::{Ending, Leg, OptimiserOutcome, SteerLeg, Trajectory, TrajectorySource};
 
 use guess::guess;
 use layout::Layout;
@@ -93,13 +94,7 @@ pub fn optimize_steered<F: DistanceField>(
 ) -> Trajectory {
     let limits = Limits::new(robot, 1.0);
     let Some(first) = guess(path, &limits) else {
-        let state = &path.states[0];
-        let leg = StillLeg {
-            pose: state.pose,
-            yaw_end: state.pose.yaw,
-            joints_from: state.joints.clone(),
-            joints_to: state.joints.clone(),
-        };
+        let leg = still(&path.states[0], &path.states[0]);
         let outcome = OptimiserOutcome { pieces: 0, iterations: 0, ending: Ending::Converged, cost: 0.0 };
         return trajectory(Leg::Still(leg), outcome);
     };

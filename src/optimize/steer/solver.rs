@@ -266,14 +266,10 @@ fn largest(gaps: &[[f64; 2]]) -> f64 {
 /// Of each sample the points that are deepest in.
 fn deepest(contacts: &[Contact]) -> Vec<Contact> {
     let mut found: Vec<Contact> = Vec::new();
-    let mut first = 0;
-    while first < contacts.len() {
-        let key = (contacts[first].piece, contacts[first].sample);
-        let last = first + contacts[first..].iter().take_while(|c| (c.piece, c.sample) == key).count();
-        let mut own = contacts[first..last].to_vec();
+    for of_sample in contacts.chunk_by(|a, b| (a.piece, a.sample) == (b.piece, b.sample)) {
+        let mut own = of_sample.to_vec();
         own.sort_by(|a, b| b.short.total_cmp(&a.short));
         found.extend(own.into_iter().take(POINTS));
-        first = last;
     }
     found
 }
