@@ -73,6 +73,19 @@ impl Local {
         0.5 * force * value
     }
 
+    /// Adds a curvature by the heading alone, where it is positive.
+    pub fn bend(&mut self, by: &[f64; DATA], curvature: f64) {
+        if curvature <= 0.0 {
+            return;
+        }
+        for (i, own) in by.iter().enumerate() {
+            let scaled = curvature * own;
+            for (entry, other) in self.hessian[i * self.size..i * self.size + i + 1].iter_mut().zip(by) {
+                *entry += scaled * other;
+            }
+        }
+    }
+
     /// The same for one dimension, whose data begin at `first`.
     pub fn square_of_joint(&mut self, first: usize, by: &[f64; DATA], by_time: f64, value: f64, weight: f64) -> f64 {
         let time = self.time * self.size;

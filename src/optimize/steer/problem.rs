@@ -299,6 +299,9 @@ impl<'a, F: DistanceField> Problem<'a, F> {
             let heading = basis.at(&self.data[HEADING]);
             let arc = basis.at(&self.data[ARC]);
             path.advance(&basis, &heading, &arc);
+            let [cos, sin] = path.direction();
+            let pull = multiplier[0] * cos + multiplier[1] * sin;
+            self.local.bend(&basis.rows[0], -self.tables[table].share(sample) * arc[1] * pull);
             let rest = (piece == 0 && sample == 0) || (piece + 1 == layout.pieces && sample == count);
             cost += self.base_limits(piece, rest, &basis, &heading, &arc, &rates, weight * self.weights.motion);
             cost += self.joint_limits(&basis, &rates, weight * self.weights.motion);
