@@ -33,6 +33,67 @@ impl Esdf {
         }
     }
 
+    /// Least value on an upright line of `rise` m from `foot` up, and its gradient by x and y: bilinear between the least of the four
+    /// columns of nodes around it. No more than the least of [`Self::distance`] along the line, and 1-Lipschitz as that is.
+    pub fn least_above(&self, foot: [f64; 3], rise: f64) -> (f64, [f64; 3]) {
+        // What reaches below or above the grid is further from all obstacles than what is next to it.
+        let z = (foot[2] - self.origin[2]) * self.inverse_resolution;
+        let (low, high) = (z.max(0.0), (z + rise * self.inverse_resolution).min(self.last[2]));
+        let Some((at, [ux, uy, _])) = self.inside([foot[0], foot[1], self.origin[2]]) else {
+            return self.least_sampled(foot, rise);
+        };
+        // Not `>`: NaN is looked at point by point.
+        if !(low <= high) {
+            return self.least_sampled(foot, rise);
+        }
+        let most = self.nodes[2] - 2;
+        let (first, last) = ((low as usize).min(most), (high as usize).min(most));
+        let [a, b, c, d] = self.least_of_columns(at + first, low - first as f64, last - first, high - last as f64);
+        let (y0, y1) = (a + uy * (b - a), c + uy * (d - c));
+        let scale = self.inverse_resolution;
+        let by_y = ((1.0 - ux) * (b - a) + ux * (d - c)) * scale;
+        (y0 + ux * (y1 - y0), [(y1 - y0) * scale, by_y, 0.0])
+    }
+
+    /// Least values of the four columns of nodes over a cell, from `low` of it up to `high` of the one `rows` further up.
+    #[inline]
+    fn least_of_columns(&self, at: usize, low: f64, rows: usize, high: f64) -> [f64; 4] {
+        let row = self.nodes[2];
+        let slab = self.nodes[1] * row;
+        let column = |first: usize| &self.values[at + first..at + first + rows + 2];
+        let columns = [column(0), column(row), column(slab), column(slab + row)];
+        let between = |column: &[f32], k: usize, u: f64| {
+            let (under, over) = (f64::from(column[k]), f64::from(column[k + 1]));
+            under + u * (over - under)
+        };
+        // Side by side: four chains of comparisons instead of one. No value is NaN.
+        let mut least = [0.0f32; 4];
+        for (least, column) in least.iter_mut().zip(&columns) {
+            *least = between(column, 0, low).min(between(column, rows, high)) as f32;
+        }
+        for k in 1..=rows {
+            for (least, column) in least.iter_mut().zip(&columns) {
+                *least = if column[k] < *least { column[k] } else { *least };
+            }
+        }
+        [f64::from(least[0]), f64::from(least[1]), f64::from(least[2]), f64::from(least[3])]
+    }
+
+    /// The same where the line leaves the grid: by points of the line a cell apart, both ends among them.
+    #[cold]
+    fn least_sampled(&self, foot: [f64; 3], rise: f64) -> (f64, [f64; 3]) {
+        let steps = (rise * self.inverse_resolution).ceil().max(1.0);
+        let mut least = (f64::INFINITY, [0.0; 3]);
+        for k in 0..=steps as usize {
+            let z = foot[2] + rise * k as f64 / steps;
+            let (distance, [x, y, _]) = self.distance_gradient([foot[0], foot[1], z]);
+            if distance < least.0 {
+                least = (distance, [x, y, 0.0]);
+            }
+        }
+        least
+    }
+
     /// Lower corner of the cell and place in it, for points in the grid but its upper faces.
     #[inline]
     fn inside(&self, p: [f64; 3]) -> Option<(usize, [f64; 3])> {

@@ -2,21 +2,34 @@
 //!
 //! The field is 1-Lipschitz: where it exceeds `clearance + r + slack` at the centre of a ball of radius r, every point in
 //! that ball is clear. `slack` covers what interpolation may do to the bound.
+//!
+//! Upright boxes and cylinders of the base never change their height, so upright lines cover them: the least distance along a line
+//! is 1-Lipschitz in x and y.
 
 use nalgebra::{Isometry3, Point3};
 
-use crate::robot::{Convex, RobotModel};
+use crate::robot::{Convex, RobotModel, Shape};
 
 /// Points in a leaf of the tree.
 const LEAF: usize = 4;
 
-/// A contour point, or for `radius > 0` a ball, fixed to a body.
+/// A contour point, or for `radius > 0` a ball, or for `rise > 0` an upright line; fixed to a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContourPoint {
-    /// In the body's frame, m.
+    /// In the body's frame, m; of a line the lower end.
     pub at: Point3<f64>,
     /// To take off the distance, m.
     pub radius: f64,
+    /// How far a line reaches up, m. Only on the base.
+    pub rise: f64,
+    /// How many points it stands for.
+    pub weight: f64,
+}
+
+impl ContourPoint {
+    fn plain(at: Point3<f64>) -> Self {
+        Self { at, radius: 0.0, rise: 0.0, weight: 1.0 }
+    }
 }
 
 /// A node of the tree: a ball that holds a range of points.
@@ -26,6 +39,8 @@ pub struct Patch {
     pub centre: Point3<f64>,
     /// Of the ball, with the points' own radii, m.
     pub radius: f64,
+    /// Of its lines, m: all begin and end at the same heights.
+    pub rise: f64,
     /// Its points are `points[first..last]`.
     pub first: usize,
     /// See `first`.
@@ -89,13 +104,18 @@ pub struct Contour {
 }
 
 impl Contour {
-    /// Samples every shape: edges and rims at `spacing` (m), the inside of faces at twice that.
+    /// Samples every shape: edges and rims at `spacing` (m), the inside of faces at twice that. What lies in a box of the same
+    /// body is left out: the box is hit first.
     pub fn new(robot: &RobotModel, spacing: f64) -> Self {
         let mut contour = Self { shapes: Vec::new(), points: Vec::new() };
-        for shape in &robot.shapes {
-            let mut points = surface_points(&shape.convex, &shape.pose, spacing);
+        for (index, shape) in robot.shapes.iter().enumerate() {
+            let lines = if shape.body == 0 { upright_lines(robot, shape, spacing) } else { None };
+            let mut points = lines.unwrap_or_else(|| surface_points(&shape.convex, &shape.pose, spacing));
+            points.retain(|p| p.rise > 0.0 || !covered(robot, index, p));
             let mut patches = Vec::new();
-            split(&mut points, contour.points.len(), &mut patches);
+            if !points.is_empty() {
+                split(&mut points, contour.points.len(), &mut patches);
+            }
             contour.points.extend(points);
             contour.shapes.push(ShapeContour { body: shape.body, patches });
         }
@@ -103,19 +123,100 @@ impl Contour {
     }
 }
 
+/// Whether a point of a shape lies in a box of the same body, or on it.
+fn covered(robot: &RobotModel, own: usize, point: &ContourPoint) -> bool {
+    robot.shapes.iter().enumerate().any(|(index, shape)| {
+        let Convex::Box { half } = &shape.convex else { return false };
+        let inside = || {
+            let at = shape.pose.inverse_transform_point(&point.at);
+            // A point that two boxes share belongs to the first.
+            let slack = if index < own { 1e-9 } else { -1e-9 };
+            (0..3).all(|k| at[k].abs() + point.radius <= half[k] + slack)
+        };
+        index != own && shape.body == robot.shapes[own].body && inside()
+    })
+}
+
+/// Cosine of an angle that counts as upright.
+const UPRIGHT: f64 = 1.0 - 1e-9;
+
+/// Lines that cover a box or cylinder of the base that stands upright.
+fn upright_lines(robot: &RobotModel, shape: &Shape, spacing: f64) -> Option<Vec<ContourPoint>> {
+    let origin = robot.bodies[0].origin;
+    let pose = origin * shape.pose;
+    let axis = |k: usize| pose.rotation.to_rotation_matrix()[(2, k)].abs();
+    let (feet, half_height): (Vec<[f64; 3]>, f64) = match &shape.convex {
+        Convex::Box { half } => {
+            let up = (0..3).find(|k| axis(*k) > UPRIGHT)?;
+            let (a, b) = ((up + 1) % 3, (up + 2) % 3);
+            let place = |[u, v]: [f64; 2]| {
+                let mut foot = [0.0; 3];
+                (foot[a], foot[b]) = (u, v);
+                foot
+            };
+            (rectangle_points([half[a], half[b]], spacing).into_iter().map(place).collect(), half[up])
+        }
+        Convex::Cylinder { radius, half_length } if axis(2) > UPRIGHT => (disc_points(*radius, spacing), *half_length),
+        _ => return None,
+    };
+    let weight = 0.5 * (steps(2.0 * half_height, spacing) + 1) as f64;
+    let line = |foot: [f64; 3]| {
+        let at = pose * Point3::from(foot) - nalgebra::Vector3::z() * half_height;
+        ContourPoint { at: origin.inverse_transform_point(&at), radius: 0.0, rise: 2.0 * half_height, weight }
+    };
+    Some(feet.into_iter().map(line).collect())
+}
+
 fn surface_points(convex: &Convex, pose: &Isometry3<f64>, spacing: f64) -> Vec<ContourPoint> {
     let local = match convex {
-        Convex::Sphere { radius } => return vec![ContourPoint { at: pose * Point3::origin(), radius: *radius }],
+        Convex::Sphere { radius } => {
+            return vec![ContourPoint { radius: *radius, ..ContourPoint::plain(pose * Point3::origin()) }];
+        }
         Convex::Box { half } => box_points(half, spacing),
         Convex::Cylinder { radius, half_length } => cylinder_points(*radius, *half_length, spacing),
         Convex::Hull { vertices } => hull_points(convex, vertices, spacing),
     };
-    local.into_iter().map(|p| ContourPoint { at: pose * Point3::from(p), radius: 0.0 }).collect()
+    local.into_iter().map(|p| ContourPoint::plain(pose * Point3::from(p))).collect()
 }
 
 /// Number of equal steps no longer than `spacing` along `length`, at least one.
 fn steps(length: f64, spacing: f64) -> usize {
     (length / spacing - 1e-9).ceil().max(1.0) as usize
+}
+
+/// The rim at `spacing`, the inside at twice that.
+fn rectangle_points(half: [f64; 2], spacing: f64) -> Vec<[f64; 2]> {
+    let n = half.map(|h| steps(2.0 * h, spacing));
+    let mut points = Vec::new();
+    for i in 0..=n[0] {
+        for j in 0..=n[1] {
+            let index = [i, j];
+            let rim = (0..2).any(|a| index[a] == 0 || index[a] == n[a]);
+            if rim || index.iter().all(|i| i.is_multiple_of(2)) {
+                points.push([0, 1].map(|a| half[a] * (2.0 * index[a] as f64 / n[a] as f64 - 1.0)));
+            }
+        }
+    }
+    points
+}
+
+/// The same of a disc about the origin.
+fn disc_points(radius: f64, spacing: f64) -> Vec<[f64; 3]> {
+    let rings = steps(radius, 2.0 * spacing);
+    let mut points = vec![[0.0; 3]];
+    for r in 1..=rings {
+        let (radius, spacing) = (radius * r as f64 / rings as f64, if r == rings { spacing } else { 2.0 * spacing });
+        points.extend(ring_points(radius, 0.0, spacing));
+    }
+    points
+}
+
+fn ring_points(radius: f64, z: f64, spacing: f64) -> impl Iterator<Item = [f64; 3]> {
+    let n = steps(std::f64::consts::TAU * radius, spacing).max(8);
+    (0..n).map(move |i| {
+        let (s, c) = (std::f64::consts::TAU * i as f64 / n as f64).sin_cos();
+        [radius * c, radius * s, z]
+    })
 }
 
 fn box_points(half: &[f64; 3], spacing: f64) -> Vec<[f64; 3]> {
@@ -138,13 +239,7 @@ fn box_points(half: &[f64; 3], spacing: f64) -> Vec<[f64; 3]> {
 
 fn cylinder_points(radius: f64, half_length: f64, spacing: f64) -> Vec<[f64; 3]> {
     let mut points = Vec::new();
-    let mut ring = |radius: f64, z: f64, spacing: f64| {
-        let n = steps(std::f64::consts::TAU * radius, spacing).max(8);
-        for i in 0..n {
-            let (s, c) = (std::f64::consts::TAU * i as f64 / n as f64).sin_cos();
-            points.push([radius * c, radius * s, z]);
-        }
-    };
+    let mut ring = |radius: f64, z: f64, spacing: f64| points.extend(ring_points(radius, z, spacing));
     // The mantle's rings are as dense along the axis as around it: a cylinder has no edge there to be hit first.
     let levels = steps(2.0 * half_length, spacing);
     for level in 0..=levels {
@@ -212,8 +307,9 @@ fn split(points: &mut [ContourPoint], offset: usize, patches: &mut Vec<Patch>) {
     let centre = nalgebra::center(&low, &high);
     let radius = points.iter().map(|p| (p.at - centre).norm() + p.radius).fold(0.0, f64::max);
     let leaf = points.len() <= LEAF;
+    let rise = points[0].rise;
     let own = patches.len();
-    patches.push(Patch { centre, radius, first: offset, last: offset + points.len(), skip_to: 0, leaf });
+    patches.push(Patch { centre, radius, rise, first: offset, last: offset + points.len(), skip_to: 0, leaf });
     if !leaf {
         let axis = (high - low).imax();
         points.sort_by(|a, b| a.at[axis].total_cmp(&b.at[axis]));
@@ -275,7 +371,7 @@ mod tests {
     fn every_patch_holds_its_points_and_leaves_hold_all() {
         let mut points: Vec<_> = box_points(&[0.3, 0.2, 0.1], 0.05)
             .into_iter()
-            .map(|p| ContourPoint { at: p.into(), radius: 0.01 })
+            .map(|p| ContourPoint { radius: 0.01, ..ContourPoint::plain(p.into()) })
             .collect();
         let mut patches = Vec::new();
         split(&mut points, 0, &mut patches);

@@ -17,6 +17,20 @@ pub trait DistanceField {
     fn distance_gradient(&self, p: [f64; 3]) -> (f64, [f64; 3]);
     /// Size of a cell that values are interpolated over, m; 0 for an exact field.
     fn cell(&self) -> f64;
+    /// Least distance on an upright line of `rise` m from `foot` up, and its gradient by x and y (its third part is 0). Here: at
+    /// places a cell apart, both ends among them.
+    fn least_above(&self, foot: [f64; 3], rise: f64) -> (f64, [f64; 3]) {
+        let steps = if self.cell() > 0.0 { (rise / self.cell()).ceil().max(1.0) } else { 16.0 };
+        let mut least = (f64::INFINITY, [0.0; 3]);
+        for k in 0..=steps as usize {
+            let z = foot[2] + rise * k as f64 / steps;
+            let (distance, [x, y, _]) = self.distance_gradient([foot[0], foot[1], z]);
+            if distance < least.0 {
+                least = (distance, [x, y, 0.0]);
+            }
+        }
+        least
+    }
 }
 
 impl DistanceField for crate::esdf::Esdf {
@@ -29,6 +43,14 @@ impl DistanceField for crate::esdf::Esdf {
     fn cell(&self) -> f64 {
         self.resolution
     }
+    fn least_above(&self, foot: [f64; 3], rise: f64) -> (f64, [f64; 3]) {
+        self.least_above(foot, rise)
+    }
+}
+
+/// Distance and gradient at a contour point that is at `at` in the map.
+fn look_up(field: &impl DistanceField, at: Vector3<f64>, rise: f64) -> (f64, [f64; 3]) {
+    if rise > 0.0 { field.least_above(at.into(), rise) } else { field.distance_gradient(at.into()) }
 }
 
 /// Interpolated values lie at most 0.26 cells above and sqrt(3)/2 cells below the true distance (MATH section 4), so a ball's
@@ -115,6 +137,8 @@ pub(crate) struct Touch<'a> {
     pub of: PointOf,
     /// By how much it misses the wanted clearance, m.
     pub short: f64,
+    /// How many points it stands for.
+    pub weight: f64,
     /// Derivatives of `short` by the pose, and by the joints.
     pub by_pose: ByPose,
     pub by_joints: &'a [f64],
@@ -126,7 +150,7 @@ fn pushed<'a>(
     frames: &[BodyFrame],
     of: PointOf,
     arm: Vector3<f64>,
-    short: f64,
+    [short, weight]: [f64; 2],
     push: Vector3<f64>,
     by_joints: &'a mut [f64],
 ) -> Touch<'a> {
@@ -142,7 +166,7 @@ fn pushed<'a>(
         link = body.parent;
     }
     let by_pose = ByPose { position: [push.x, push.y], heading: arm.x * push.y - arm.y * push.x };
-    Touch { of, short, by_pose, by_joints }
+    Touch { of, short, weight, by_pose, by_joints }
 }
 
 impl ClearancePenalty {
@@ -239,11 +263,11 @@ impl ClearancePenalty {
         self.loads.fill(Load::none());
         let (scale, mut sum, mut touched) = (self.scale, 0.0, false);
         let mut loads = std::mem::take(&mut self.loads);
-        self.scan(field, at.position, sample, |PointOf { body, .. }, arm, short, gradient| {
+        self.scan(field, at.position, sample, |PointOf { body, .. }, arm, [short, weight], gradient| {
             let (cost, slope) = judge.weigh(short / scale);
-            sum += cost;
+            sum += weight * cost;
             if slope != 0.0 {
-                let push = gradient * (-slope / scale);
+                let push = gradient * (-weight * slope / scale);
                 loads[body].force += push;
                 loads[body].torque += arm.cross(&push);
                 touched = true;
@@ -272,9 +296,9 @@ impl ClearancePenalty {
         self.place(robot, at.heading, at.joints);
         let mut by_joints = std::mem::take(&mut self.by_joints);
         let frames = std::mem::take(&mut self.frames);
-        self.scan_in(&frames, field, at.position, sample, |point, arm, short, gradient| {
+        self.scan_in(&frames, field, at.position, sample, |point, arm, [short, weight], gradient| {
             if short > 0.0 {
-                touch(pushed(robot, &frames, point, arm, short, -gradient, &mut by_joints));
+                touch(pushed(robot, &frames, point, arm, [short, weight], -gradient, &mut by_joints));
             }
         });
         self.frames = frames;
@@ -296,9 +320,9 @@ impl ClearancePenalty {
         for &of in points {
             let (frame, point) = (&self.frames[of.body], &self.contour.points[of.point]);
             let arm = frame.rotation * point.at.coords + frame.origin;
-            let (distance, gradient) = field.distance_gradient((arm + base).into());
+            let (distance, gradient) = look_up(field, arm + base, point.rise);
             let short = self.clearance + point.radius - distance;
-            touch(pushed(robot, &self.frames, of, arm, short, -Vector3::from(gradient), &mut by_joints));
+            touch(pushed(robot, &self.frames, of, arm, [short, point.weight], -Vector3::from(gradient), &mut by_joints));
         }
         self.by_joints = by_joints;
     }
@@ -308,7 +332,7 @@ impl ClearancePenalty {
         field: &impl DistanceField,
         position: [f64; 2],
         sample: usize,
-        point: impl FnMut(PointOf, Vector3<f64>, f64, Vector3<f64>),
+        point: impl FnMut(PointOf, Vector3<f64>, [f64; 2], Vector3<f64>),
     ) {
         let frames = std::mem::take(&mut self.frames);
         self.scan_in(&frames, field, position, sample, point);
@@ -316,14 +340,14 @@ impl ClearancePenalty {
     }
 
     /// Looks at every point that may miss the clearance: which, where it is from the base's origin (map axes), by how much it
-    /// misses (m), and the field's gradient there. Notes how far each shape may move before that has to be done again.
+    /// misses (m) and what it counts, and the field's gradient there. Notes how far each shape may move before that has to be done again.
     fn scan_in(
         &mut self,
         frames: &[BodyFrame],
         field: &impl DistanceField,
         position: [f64; 2],
         sample: usize,
-        mut look: impl FnMut(PointOf, Vector3<f64>, f64, Vector3<f64>),
+        mut look: impl FnMut(PointOf, Vector3<f64>, [f64; 2], Vector3<f64>),
     ) {
         let stride = self.stride();
         let free = &mut self.memory[sample * stride + 4 + self.joints..(sample + 1) * stride];
@@ -338,7 +362,11 @@ impl ClearancePenalty {
             *free = f64::INFINITY;
             while let Some(patch) = shape.patches.get(node) {
                 let centre = placed(&patch.centre) + base;
-                let spare = field.distance(centre.into()) - self.clearance;
+                let distance = match patch.rise {
+                    rise if rise > 0.0 => field.least_above(centre.into(), rise).0,
+                    _ => field.distance(centre.into()),
+                };
+                let spare = distance - self.clearance;
                 let spare = (spare - patch.radius - self.slack).max(spare / INTERPOLATION_SLOPE - patch.radius);
                 if spare > if patch.leaf { 0.0 } else { WORTH_A_LOOK } {
                     *free = free.min(spare);
@@ -352,10 +380,11 @@ impl ClearancePenalty {
                 for index in patch.first..patch.last {
                     let point = &self.contour.points[index];
                     let arm = placed(&point.at);
-                    let (distance, gradient) = field.distance_gradient((arm + base).into());
+                    let (distance, gradient) = look_up(field, arm + base, point.rise);
                     let short = self.clearance + point.radius - distance;
                     *free = free.min(-short / INTERPOLATION_SLOPE);
-                    look(PointOf { body: shape.body, point: index }, arm, short, Vector3::from(gradient));
+                    let of = PointOf { body: shape.body, point: index };
+                    look(of, arm, [short, point.weight], Vector3::from(gradient));
                 }
             }
         }
@@ -431,7 +460,8 @@ mod tests {
                 let whole = shape.patches[0];
                 for point in &contour.points[whole.first..whole.last] {
                     let p = base * poses[shape.body] * point.at;
-                    sum += judge.weigh((0.15 + point.radius - field.distance(p.coords.into())) / 0.05).0;
+                    let (distance, _) = look_up(&field, p.coords, point.rise);
+                    sum += point.weight * judge.weigh((0.15 + point.radius - distance) / 0.05).0;
                 }
             }
             prop_assert!((cost - sum).abs() < 1e-9 * (1.0 + sum), "{cost} vs {sum}");

@@ -40,7 +40,13 @@ impl Basis {
 
     /// Value and three derivatives in unit time.
     pub fn at(&self, data: &[f64; DATA]) -> [f64; 4] {
-        self.rows.map(|row| row.iter().zip(data).map(|(a, b)| a * b).sum())
+        let mut values = [0.0; 4];
+        for (value, row) in values.iter_mut().zip(&self.rows) {
+            for (a, b) in row.iter().zip(data) {
+                *value += a * b;
+            }
+        }
+        values
     }
 }
 

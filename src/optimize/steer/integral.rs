@@ -11,8 +11,8 @@ pub(super) type ByData = [f64; 2 * DATA];
 
 /// What the integrand is made of at one sample.
 #[derive(Clone, Copy)]
-struct Place {
-    basis: Basis,
+struct Place<'t> {
+    basis: &'t Basis,
     /// First and second derivative of the arc length in unit time.
     speed: f64,
     acceleration: f64,
@@ -22,7 +22,7 @@ struct Place {
     cos: f64,
 }
 
-impl Place {
+impl Place<'_> {
     fn along(&self) -> [f64; 2] {
         [self.cos, self.sin]
     }
@@ -38,44 +38,48 @@ impl Place {
     fn by(&self, axis: usize) -> ByData {
         let (along, across) = (self.along()[axis], self.speed * self.across()[axis]);
         let [values, slopes, ..] = &self.basis.rows;
-        std::array::from_fn(|k| if k < DATA { across * values[k] } else { along * slopes[k - DATA] })
+        let mut by = [0.0; 2 * DATA];
+        for k in 0..DATA {
+            by[k] = across * values[k];
+            by[DATA + k] = along * slopes[k];
+        }
+        by
     }
 
     fn slope_by(&self, axis: usize) -> ByData {
         let (along, across) = (self.along()[axis], self.across()[axis]);
         let [values, slopes, bends, _] = &self.basis.rows;
         let own = self.acceleration * across - self.speed * self.turn * along;
-        std::array::from_fn(|k| {
-            if k < DATA {
-                own * values[k] + self.speed * across * slopes[k]
-            } else {
-                along * bends[k - DATA] + self.turn * across * slopes[k - DATA]
-            }
-        })
+        let mut by = [0.0; 2 * DATA];
+        for k in 0..DATA {
+            by[k] = own * values[k] + self.speed * across * slopes[k];
+            by[DATA + k] = along * bends[k] + self.turn * across * slopes[k];
+        }
+        by
     }
 }
 
 /// The integral up to the last sample that was handed in.
-pub(super) struct Integral {
+pub(super) struct Integral<'t> {
     step: f64,
     /// Half the first integrand and all after it, the last one left out.
     sum: [f64; 2],
     sum_by: [ByData; 2],
-    ends: Option<(Place, Place)>,
+    ends: Option<(Place<'t>, Place<'t>)>,
     /// Half at the first sample, then 1.
     share: f64,
 }
 
-impl Integral {
+impl<'t> Integral<'t> {
     /// Of samples `step` apart in unit time.
     pub fn new(step: f64) -> Self {
         Self { step, sum: [0.0; 2], sum_by: [[0.0; 2 * DATA]; 2], ends: None, share: 0.5 }
     }
 
     /// Goes on to the next sample, with the heading's and the arc length's value and derivatives in unit time.
-    pub fn advance(&mut self, basis: &Basis, heading: &[f64; 4], arc: &[f64; 4]) {
+    pub fn advance(&mut self, basis: &'t Basis, heading: &[f64; 4], arc: &[f64; 4]) {
         let (sin, cos) = heading[0].sin_cos();
-        let next = Place { basis: *basis, speed: arc[1], acceleration: arc[2], turn: heading[1], sin, cos };
+        let next = Place { basis, speed: arc[1], acceleration: arc[2], turn: heading[1], sin, cos };
         let Some((first, last)) = self.ends else {
             self.ends = Some((next, next));
             return;
@@ -111,7 +115,11 @@ impl Integral {
         let (Some((first, last)), 1.0) = (&self.ends, self.share) else { return [0.0; 2 * DATA] };
         let correction = self.step * self.step / 12.0;
         let (own, from, to) = (last.by(axis), first.slope_by(axis), last.slope_by(axis));
-        std::array::from_fn(|k| self.step * (self.sum_by[axis][k] + 0.5 * own[k]) + correction * (from[k] - to[k]))
+        let mut by = [0.0; 2 * DATA];
+        for k in 0..2 * DATA {
+            by[k] = self.step * (self.sum_by[axis][k] + 0.5 * own[k]) + correction * (from[k] - to[k]);
+        }
+        by
     }
 }
 
@@ -123,13 +131,16 @@ mod tests {
     const HEADING: [f64; DATA] = [0.3, 0.4, -1.0, 1.5, 0.2, 0.7];
     const ARC: [f64; DATA] = [0.0, 0.5, 0.3, 0.9, 1.1, -0.4];
 
-    fn run(data: &[f64], samples: usize) -> Integral {
+    fn bases(samples: usize) -> Vec<Basis> {
+        (0..=samples).map(|j| Basis::new(j as f64 / samples as f64)).collect()
+    }
+
+    fn run<'t>(data: &[f64], bases: &'t [Basis]) -> Integral<'t> {
         let split = |from: usize| std::array::from_fn(|k| data[from + k]);
         let (heading, arc): ([f64; DATA], [f64; DATA]) = (split(0), split(DATA));
-        let mut integral = Integral::new(1.0 / samples as f64);
-        for j in 0..=samples {
-            let basis = Basis::new(j as f64 / samples as f64);
-            integral.advance(&basis, &basis.at(&heading), &basis.at(&arc));
+        let mut integral = Integral::new(1.0 / (bases.len() - 1) as f64);
+        for basis in bases {
+            integral.advance(basis, &basis.at(&heading), &basis.at(&arc));
         }
         integral
     }
@@ -140,9 +151,9 @@ mod tests {
 
     #[test]
     fn the_error_falls_with_the_fourth_power_of_the_step() {
-        let exact = run(&data(), 4000).position();
+        let exact = run(&data(), &bases(4000)).position();
         let error = |samples: usize| {
-            let found = run(&data(), samples).position();
+            let found = run(&data(), &bases(samples)).position();
             (found[0] - exact[0]).hypot(found[1] - exact[1])
         };
         assert!(error(10) < 1e-5, "{}", error(10));
@@ -152,9 +163,10 @@ mod tests {
 
     #[test]
     fn its_derivatives_match_finite_differences() {
+        let bases = bases(9);
         for axis in 0..2 {
-            let numeric = numeric_gradient(|x| run(x, 9).position()[axis], &data(), 1e-3);
-            assert!(relative_error(&run(&data(), 9).by_data(axis), &numeric, 1e-3) < 1e-8);
+            let numeric = numeric_gradient(|x| run(x, &bases).position()[axis], &data(), 1e-3);
+            assert!(relative_error(&run(&data(), &bases).by_data(axis), &numeric, 1e-3) < 1e-8);
         }
     }
 

@@ -8,6 +8,8 @@
 //! All costs but time are squares: of the jerk, and of what exceeds a limit. In heading and arc length every limit of the base is
 //! linear in one derivative, so the Gauss-Newton Hessian leaves out hardly anything.
 
+use std::rc::Rc;
+
 use super::hermite::{Basis, DATA, jerk_energy};
 use super::integral::{ByData, Integral};
 use super::layout::{ARC, HEADING, Layout};
@@ -87,7 +89,7 @@ pub(super) struct Problem<'a, F> {
     /// What a jerk of each dimension is measured in.
     jerk_scales: Vec<f64>,
     energy: [[f64; DATA]; DATA],
-    tables: Vec<Table>,
+    tables: Vec<Rc<Table>>,
     /// Of each piece, its table and the number of its first sample.
     samples: Vec<(usize, usize)>,
     local: Local,
@@ -181,7 +183,7 @@ impl<'a, F: DistanceField> Problem<'a, F> {
             weights,
             jerk_scales,
             energy: jerk_energy(),
-            tables: sizes.into_iter().map(Table::new).collect(),
+            tables: sizes.into_iter().map(|count| Rc::new(Table::new(count))).collect(),
             samples,
             local: Local::new(layout),
             offsets: layout.offsets(),
@@ -291,21 +293,23 @@ impl<'a, F: DistanceField> Problem<'a, F> {
         let rate = 1.0 / time;
         let rates = [1.0, rate, rate * rate, rate * rate * rate];
         let (table, first) = self.samples[piece];
-        let count = self.tables[table].count();
+        let table = Rc::clone(&self.tables[table]);
+        let count = table.count();
         let mut path = Integral::new(1.0 / count as f64);
         for sample in 0..=count {
-            let basis = self.tables[table].bases[sample];
-            let weight = self.tables[table].share(sample) * time;
+            let basis = &table.bases[sample];
+            let share = table.share(sample);
+            let weight = share * time;
             let heading = basis.at(&self.data[HEADING]);
             let arc = basis.at(&self.data[ARC]);
-            path.advance(&basis, &heading, &arc);
+            path.advance(basis, &heading, &arc);
             let [cos, sin] = path.direction();
             let pull = multiplier[0] * cos + multiplier[1] * sin;
-            self.local.bend(&basis.rows[0], -self.tables[table].share(sample) * arc[1] * pull);
+            self.local.bend(&basis.rows[0], -share * arc[1] * pull);
             let rest = (piece == 0 && sample == 0) || (piece + 1 == layout.pieces && sample == count);
-            cost += self.base_limits(piece, rest, &basis, &heading, &arc, &rates, weight * self.weights.motion);
-            cost += self.joint_limits(&basis, &rates, weight * self.weights.motion);
-            cost += self.clearance_at([piece, sample, first + sample], &basis, &path, start, weight);
+            cost += self.base_limits(piece, rest, basis, &heading, &arc, &rates, weight * self.weights.motion);
+            cost += self.joint_limits(basis, &rates, weight * self.weights.motion);
+            cost += self.clearance_at([piece, sample, first + sample], basis, &path, start, weight);
         }
         let reached = path.position();
         let end = layout.position(piece + 1);
@@ -462,7 +466,7 @@ impl<'a, F: DistanceField> Problem<'a, F> {
         &mut self,
         [piece, sample, index]: [usize; 3],
         basis: &Basis,
-        path: &Integral,
+        path: &Integral<'_>,
         start: [f64; 2],
         duration: f64,
     ) -> f64 {
@@ -479,10 +483,11 @@ impl<'a, F: DistanceField> Problem<'a, F> {
                 hessian.fill(0.0);
             }
             let value = touch.short / unit;
-            sum += value * value;
+            sum += touch.weight * value * value;
             contacts.push(Contact { piece, sample, of: touch.of, short: touch.short });
             for i in 0..n {
                 let own = by_pose(&touch, i, n, unit);
+                let own = touch.weight * own;
                 near[i] += value * own;
                 for j in 0..=i {
                     hessian[i * n + j] += own * by_pose(&touch, j, n, unit);
@@ -573,14 +578,14 @@ impl<'a, F: DistanceField> Problem<'a, F> {
         while let Some(Contact { piece, .. }) = contacts.get(first).copied() {
             let last = first + contacts[first..].iter().take_while(|c| c.piece == piece).count();
             let time = self.load(piece, x);
-            let (table, _) = self.samples[piece];
-            let count = self.tables[table].count();
+            let table = Rc::clone(&self.tables[self.samples[piece].0]);
+            let count = table.count();
             let mut path = Integral::new(1.0 / count as f64);
             let at = layout.position(piece);
             let mut next = first;
             for sample in 0..=count {
-                let basis = self.tables[table].bases[sample];
-                path.advance(&basis, &basis.at(&self.data[HEADING]), &basis.at(&self.data[ARC]));
+                let basis = &table.bases[sample];
+                path.advance(basis, &basis.at(&self.data[HEADING]), &basis.at(&self.data[ARC]));
                 let here = contacts[next..last].iter().take_while(|c| c.sample == sample).count();
                 if here == 0 {
                     continue;
@@ -593,9 +598,9 @@ impl<'a, F: DistanceField> Problem<'a, F> {
                 let placement = Placement { position, heading: path.direction(), joints: &self.joints };
                 let points: Vec<PointOf> = contacts[next..next + here].iter().map(|c| c.of).collect();
                 next += here;
-                sample_jacobian(layout, &path, &basis, &mut self.jacobian[..n * size]);
+                sample_jacobian(layout, &path, basis, &mut self.jacobian[..n * size]);
                 let unit = self.weights.clearance_unit;
-                let weight = self.weights.clearance * self.tables[table].share(sample) * time;
+                let weight = self.weights.clearance * table.share(sample) * time;
                 let jacobian = &self.jacobian;
                 self.clearance.look(self.robot, self.field, placement, &points, |touch| {
                     let mut by = vec![0.0; size];
@@ -605,7 +610,7 @@ impl<'a, F: DistanceField> Problem<'a, F> {
                             *value += own * entry;
                         }
                     }
-                    rows.push(Row { piece, weight, value: touch.short / unit, by });
+                    rows.push(Row { piece, weight: weight * touch.weight, value: touch.short / unit, by });
                 });
             }
             let from = rows.iter().rposition(|r: &Row| r.piece != piece).map_or(0, |k| k + 1);
@@ -684,7 +689,7 @@ fn by_pose(touch: &Touch<'_>, index: usize, count: usize, unit: f64) -> f64 {
 }
 
 /// Rows (x, y, heading, joints, logarithm of the duration) by the local coordinates.
-fn sample_jacobian(layout: Layout, path: &Integral, basis: &Basis, jacobian: &mut [f64]) {
+fn sample_jacobian(layout: Layout, path: &Integral<'_>, basis: &Basis, jacobian: &mut [f64]) {
     let (size, time) = (layout.local_size(), layout.local_time());
     jacobian.fill(0.0);
     for axis in 0..2 {
@@ -701,7 +706,7 @@ fn sample_jacobian(layout: Layout, path: &Integral, basis: &Basis, jacobian: &mu
 }
 
 /// A gap by the local coordinates.
-fn gap_jacobian(layout: Layout, path: &Integral, axis: usize, jacobian: &mut [f64]) {
+fn gap_jacobian(layout: Layout, path: &Integral<'_>, axis: usize, jacobian: &mut [f64]) {
     jacobian.fill(0.0);
     jacobian[..2 * DATA].copy_from_slice(&path.by_data(axis));
     jacobian[layout.local_time() + 1 + axis] = 1.0;
