@@ -29,7 +29,7 @@ use solver::{Solved, SolverOptions, close, solve};
 #[derive(Debug, Clone, PartialEq)]
 pub struct SteerOptions {
     /// Weight of the jerk (squared, relative to the wheels' and joints' jerk limits) against time; larger is smoother, and slower in
-    /// the optimiser's own timing. Default 180: a mean jerk as small as \[SCR\]'s at its limits. The time law makes up for nearly
+    /// the optimiser's own timing. Default 200: a mean jerk as small as \[SCR\]'s at its limits. The time law makes up for nearly
     /// all of it.
     pub smoothness: f64,
     /// Weight of a limit overstepped by 100 % for 1 s, s. Default 30.
@@ -41,22 +41,22 @@ pub struct SteerOptions {
     pub sample_distance: f64,
     /// See `sample_distance`.
     pub sample_time: f64,
-    /// Steps at most. Default 80.
+    /// Steps at most. Default 120.
     pub max_iterations: usize,
-    /// The iteration ends where a step lowers the cost by less than this share. Default 2e-3.
+    /// The iteration ends where a step lowers the cost by less than this share. Default 5e-4.
     pub tolerance: f64,
 }
 
 impl Default for SteerOptions {
     fn default() -> Self {
         Self {
-            smoothness: 180.0,
+            smoothness: 200.0,
             motion_weight: 30.0,
             clearance_weight: 200.0,
             sample_distance: 0.15,
             sample_time: 0.2,
-            max_iterations: 80,
-            tolerance: 2e-3,
+            max_iterations: 120,
+            tolerance: 5e-4,
         }
     }
 }
