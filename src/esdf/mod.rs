@@ -213,4 +213,38 @@ mod tests {
         assert!((walled.distance([0.5, 2.0, 0.2]) - 0.5).abs() < 1e-6);
         assert!((walled.distance([-0.3, 2.0, 0.2]) + 0.3).abs() < 1e-6);
     }
+
+    proptest! {
+        #[test]
+        fn the_least_of_a_line_is_that_of_its_points_but_for_interpolation(
+            cells in proptest::collection::vec(0..2000usize, 1..30),
+            at in proptest::array::uniform2(0.02..0.98f64),
+            foot in -0.5..1.3f64,
+            rise in 0.01..1.5f64,
+        ) {
+            let map = random_map([9, 8, 7], &cells, Unknown::Free);
+            let field = build(&map);
+            let bounds = map.bounds();
+            let place = |a: usize| bounds.min[a] + at[a] * (bounds.max[a] - bounds.min[a]);
+            let foot = [place(0), place(1), bounds.min[2] + foot];
+            let (least, gradient) = field.least_above(foot, rise);
+            let along = |k: usize| field.distance([foot[0], foot[1], foot[2] + rise * k as f64 / 400.0]);
+            let points = (0..=400).map(along).fold(f64::INFINITY, f64::min);
+            // Never above; below by what bilinear values of minima may differ from minima of trilinear values, and rounding to f32.
+            prop_assert!(least < points + 1e-6, "{least} {points}");
+            prop_assert!(least > points - 0.71 * field.resolution, "{least} {points}");
+            let step = 1e-6;
+            for axis in 0..2 {
+                // Within a cell: the gradient jumps between cells.
+                let mut moved = foot;
+                moved[axis] += step;
+                let cell = |p: [f64; 3]| ((p[axis] - field.origin[axis]) / field.resolution).floor();
+                let on = foot[2] + rise > field.origin[2] && foot[2] < field.origin[2] + field.last[2] * field.resolution;
+                if cell(moved) == cell(foot) && on {
+                    let numeric = (field.least_above(moved, rise).0 - least) / step;
+                    prop_assert!((numeric - gradient[axis]).abs() < 1e-3, "{numeric} {gradient:?}");
+                }
+            }
+        }
+    }
 }

@@ -388,4 +388,59 @@ mod tests {
         assert_eq!(seen, points.len());
         assert_eq!(patches[0].skip_to, patches.len());
     }
+
+    fn upright(half: [f64; 3]) -> Shape {
+        let pose = Isometry3::translation(0.1, 0.2, 0.4);
+        Shape { link: "base_link".into(), body: 0, pose, convex: Convex::Box { half } }
+    }
+
+    #[test]
+    fn an_upright_box_or_cylinder_of_the_base_is_covered_by_lines_of_its_height() {
+        let mut robot = crate::optimize::test_robot::robot(0);
+        robot.bodies[0].origin = Isometry3::translation(0.0, 0.0, 0.05);
+        let cylinder = Shape { convex: Convex::Cylinder { radius: 0.2, half_length: 0.3 }, ..upright([0.1; 3]) };
+        for (shape, half_height) in [(upright([0.21, 0.17, 0.3]), 0.3), (cylinder, 0.3)] {
+            let lines = upright_lines(&robot, &shape, 0.05).expect("it stands upright");
+            let mut feet: Vec<[f64; 3]> = lines.iter().map(|p| p.at.into()).collect();
+            for line in &lines {
+                assert!((line.rise - 2.0 * half_height).abs() < 1e-12 && (line.at.z - 0.1).abs() < 1e-12);
+            }
+            // The rim is within half a spacing, the inside within twice that of a corner of a square.
+            for k in 0..720 {
+                let (s, c) = (k as f64).to_radians().sin_cos();
+                let (rim, within) = match shape.convex {
+                    Convex::Cylinder { radius, .. } => ([radius * c, radius * s], [0.4 * radius * c, 0.4 * radius * s]),
+                    _ => ([0.21, 0.17 * s], [0.15 * c, 0.12 * s]),
+                };
+                assert!(nearest(&feet, [0.1 + rim[0], 0.2 + rim[1], 0.1]) < 0.0251);
+                assert!(nearest(&feet, [0.1 + within[0], 0.2 + within[1], 0.1]) < 0.0751);
+            }
+            let count = feet.len();
+            feet.sort_by(|a, b| a.partial_cmp(b).expect("finite"));
+            feet.dedup();
+            assert_eq!(count, feet.len(), "each place once");
+        }
+        let mut tilted = upright([0.1; 3]);
+        tilted.pose.rotation = nalgebra::UnitQuaternion::from_euler_angles(0.1, 0.0, 0.0);
+        assert_eq!(upright_lines(&robot, &tilted, 0.05), None);
+    }
+
+    #[test]
+    fn what_a_box_of_the_same_body_covers_needs_no_points_of_its_own() {
+        let mut robot = crate::optimize::test_robot::robot(0);
+        let wheels =
+            |robot: &RobotModel| Contour::new(robot, 0.05).shapes[1].patches.first().map_or(0, |p| p.last - p.first);
+        let all = wheels(&robot);
+        // The base's box hides the upper part of the wheels, which reach down to the floor.
+        let whole = surface_points(&robot.shapes[1].convex, &robot.shapes[1].pose, 0.05).len();
+        assert!(all > 0 && all < whole, "{all} of {whole}");
+        robot.shapes[0].convex = Convex::Box { half: [0.5, 0.5, 0.5] };
+        assert_eq!(wheels(&robot), 0);
+        // Two boxes in the same place do not hide one another.
+        robot.shapes = vec![upright([0.1; 3]), upright([0.1; 3])];
+        robot.shapes[0].pose.rotation = nalgebra::UnitQuaternion::from_euler_angles(0.1, 0.0, 0.0);
+        robot.shapes[1].pose = robot.shapes[0].pose;
+        let contour = Contour::new(&robot, 0.05);
+        assert!(contour.shapes.iter().any(|shape| !shape.patches.is_empty()));
+    }
 }

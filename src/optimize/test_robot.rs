@@ -16,6 +16,28 @@ impl DistanceField for Balls {
         self.distance_gradient(p).0
     }
     fn distance_gradient(&self, p: [f64; 3]) -> (f64, [f64; 3]) {
+        let (sum, gradient) = self.shares(p);
+        (-sum.ln() / SHARPNESS, gradient.map(|g| g / sum))
+    }
+    fn cell(&self) -> f64 {
+        0.0
+    }
+    /// As smooth as the distance: the heights are rounded off like the balls.
+    fn least_above(&self, foot: [f64; 3], rise: f64) -> (f64, [f64; 3]) {
+        let (mut sum, mut gradient) = (0.0, [0.0; 3]);
+        for k in 0..=8 {
+            let (own, [x, y, _]) = self.shares([foot[0], foot[1], foot[2] + rise * k as f64 / 8.0]);
+            sum += own;
+            gradient[0] += x;
+            gradient[1] += y;
+        }
+        (-sum.ln() / SHARPNESS, gradient.map(|g| g / sum))
+    }
+}
+
+impl Balls {
+    /// What the balls add up to at a point, and each one's share times its direction.
+    fn shares(&self, p: [f64; 3]) -> (f64, [f64; 3]) {
         let (mut sum, mut gradient) = (0.0, [0.0; 3]);
         for (centre, radius) in &self.0 {
             let d: [f64; 3] = std::array::from_fn(|k| p[k] - centre[k]);
@@ -24,10 +46,7 @@ impl DistanceField for Balls {
             sum += share;
             (0..3).for_each(|k| gradient[k] += share * d[k] / norm);
         }
-        (-sum.ln() / SHARPNESS, gradient.map(|g| g / sum))
-    }
-    fn cell(&self) -> f64 {
-        0.0
+        (sum, gradient)
     }
 }
 

@@ -311,18 +311,26 @@ impl ClearancePenalty {
         robot: &RobotModel,
         field: &impl DistanceField,
         at: Placement<'_>,
-        points: &[PointOf],
+        points: impl Iterator<Item = PointOf>,
         mut touch: impl FnMut(Touch<'_>),
     ) {
         self.place(robot, at.heading, at.joints);
         let mut by_joints = std::mem::take(&mut self.by_joints);
         let base = Vector3::new(at.position[0], at.position[1], 0.0);
-        for &of in points {
+        for of in points {
             let (frame, point) = (&self.frames[of.body], &self.contour.points[of.point]);
             let arm = frame.rotation * point.at.coords + frame.origin;
             let (distance, gradient) = look_up(field, arm + base, point.rise);
             let short = self.clearance + point.radius - distance;
-            touch(pushed(robot, &self.frames, of, arm, [short, point.weight], -Vector3::from(gradient), &mut by_joints));
+            touch(pushed(
+                robot,
+                &self.frames,
+                of,
+                arm,
+                [short, point.weight],
+                -Vector3::from(gradient),
+                &mut by_joints,
+            ));
         }
         self.by_joints = by_joints;
     }
@@ -457,8 +465,8 @@ mod tests {
             let base = crate::geom::Pose2::new(x, y, yaw).isometry();
             let mut sum = 0.0;
             for shape in &contour.shapes {
-                let whole = shape.patches[0];
-                for point in &contour.points[whole.first..whole.last] {
+                let own = shape.patches.first().map_or(0..0, |whole| whole.first..whole.last);
+                for point in &contour.points[own] {
                     let p = base * poses[shape.body] * point.at;
                     let (distance, _) = look_up(&field, p.coords, point.rise);
                     sum += point.weight * judge.weigh((0.15 + point.radius - distance) / 0.05).0;

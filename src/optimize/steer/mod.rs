@@ -5,7 +5,9 @@ mod guess;
 mod hermite;
 mod integral;
 mod layout;
+mod limits;
 mod local;
+mod near;
 mod problem;
 mod solver;
 
@@ -23,7 +25,7 @@ use crate::trajectory::{Ending, Leg, OptimiserOutcome, SteerLeg, Trajectory, Tra
 use guess::guess;
 use layout::Layout;
 use problem::{Problem, Weights};
-use solver::{Solved, SolverOptions, close, solve};
+use solver::{Solved, SolverOptions, Workspace, close, solve};
 
 /// How to optimise heading and arc length.
 #[derive(Debug, Clone, PartialEq)]
@@ -118,7 +120,8 @@ pub fn optimize_steered<F: DistanceField>(
     if forwards {
         problem.floors.fill(FLOOR * limits.speed);
     }
-    let mut solved = solve(&mut problem, &mut x, &solver);
+    let mut work = Workspace::new(&problem);
+    let mut solved = solve(&mut problem, &mut x, &solver, &mut work);
     // The penalty is soft. A path that only drives forwards must not be left to back up, be it by a millimetre.
     for _ in 0..if forwards { BACKING_ROUNDS } else { 0 } {
         let backing = problem.backing_up(&x);
@@ -128,7 +131,7 @@ pub fn optimize_steered<F: DistanceField>(
         for (floor, back) in problem.floors.iter_mut().zip(&backing) {
             *floor += if *back > BACKING { 2.0 * back + 1e-3 * limits.speed } else { 0.0 };
         }
-        let again = solve(&mut problem, &mut x, &solver);
+        let again = solve(&mut problem, &mut x, &solver, &mut work);
         solved = Solved { iterations: solved.iterations + again.iterations, ..again };
     }
     let pose = path.states[0].pose;
@@ -144,7 +147,7 @@ pub fn optimize_steered<F: DistanceField>(
         let at = layout.position(layout.pieces);
         x[at] += off[0];
         x[at + 1] += off[1];
-        close(&mut problem, &mut x, GAP_TOLERANCE);
+        close(&mut problem, &mut x, GAP_TOLERANCE, &mut work);
     }
     let leg = SteerLeg { pose, curve: curve(layout, &x) };
     let ending = if solved.converged { Ending::Converged } else { Ending::IterationLimit };

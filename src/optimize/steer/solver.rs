@@ -5,7 +5,8 @@
 //! judged by the augmented Lagrangian with the multipliers that the step itself gives. The model does not know limits that are
 //! still kept; where a step has pushed contour points into obstacles, it is made again with those points in the model.
 
-use super::problem::{Contact, Derivatives, Problem, Row, STIFFNESS};
+use super::near::Rows;
+use super::problem::{Derivatives, Problem, STIFFNESS};
 use crate::math::banded::Banded;
 use crate::optimize::penalty::clearance::DistanceField;
 
@@ -33,12 +34,11 @@ const GAP_PRICE: f64 = 200.0;
 const FIRST_DAMPING: f64 = 0.3;
 /// Share of the costs' own curvature in the damping.
 const DIAGONAL_SHARE: f64 = 0.01;
-/// Contour points a sample that a step made again looks at.
-const POINTS: usize = 3;
 /// The iteration ends where a step lowers the merit little and leaves gaps below this, m.
 const SMALL_GAP: f64 = 1e-4;
 
-struct Workspace {
+/// Scratch memory; once there, iterating allocates nothing.
+pub(super) struct Workspace {
     here: Derivatives,
     there: Derivatives,
     factor: Banded,
@@ -49,6 +49,9 @@ struct Workspace {
     natural: Vec<f64>,
     multipliers: Vec<[f64; 2]>,
     next_multipliers: Vec<[f64; 2]>,
+    /// Points that a first attempt has pushed into obstacles, and which of them are in the model.
+    rows: Rows,
+    taken: Vec<bool>,
 }
 
 /// A step's merit: here, as the model predicts, as it is.
@@ -62,27 +65,31 @@ struct Merit {
 }
 
 /// Improves `x`.
-pub(super) fn solve<F: DistanceField>(problem: &mut Problem<'_, F>, x: &mut [f64], options: &SolverOptions) -> Solved {
-    let mut work = Workspace::new(problem, x);
+pub(super) fn solve<F: DistanceField>(
+    problem: &mut Problem<'_, F>,
+    x: &mut [f64],
+    options: &SolverOptions,
+    work: &mut Workspace,
+) -> Solved {
+    work.multipliers.fill([0.0; 2]);
     let mut damping = FIRST_DAMPING;
     let mut cost = problem.evaluate(x, &work.multipliers, &mut work.here);
     let mut solved = Solved { cost, iterations: 0, converged: false };
     while solved.iterations < options.max_iterations {
-        let mut rows: Vec<Row> = Vec::new();
         let mut merit = None;
+        work.rows.clear();
         // The second time with the contour points that the first has pushed into obstacles.
         for _ in 0..2 {
             solved.iterations += 1;
-            merit = work.attempt(problem, x, cost, damping, &rows);
+            merit = work.attempt(problem, x, cost, damping);
             let Some(found) = &merit else { break };
             if found.accepted() {
                 break;
             }
-            let contacts = deepest(&problem.contacts);
-            if contacts.is_empty() {
+            if problem.contacts.as_slice().is_empty() {
                 break;
             }
-            rows.extend(problem.rows(x, &contacts));
+            problem.linearise_contacts(x, &mut work.rows);
         }
         match merit.filter(Merit::accepted) {
             Some(merit) => {
@@ -124,27 +131,36 @@ impl Merit {
 }
 
 /// Closes the gaps of `x` by steps that look at nothing else.
-pub(super) fn close<F: DistanceField>(problem: &mut Problem<'_, F>, x: &mut [f64], tolerance: f64) {
-    let mut work = Workspace::new(problem, x);
+pub(super) fn close<F: DistanceField>(
+    problem: &mut Problem<'_, F>,
+    x: &mut [f64],
+    tolerance: f64,
+    work: &mut Workspace,
+) {
+    work.multipliers.fill([0.0; 2]);
     let cost = problem.evaluate(x, &work.multipliers, &mut work.here);
     work.close_gaps(problem, x, cost, tolerance);
 }
 
 impl Workspace {
-    fn new<F: DistanceField>(problem: &Problem<'_, F>, x: &[f64]) -> Self {
+    pub fn new<F: DistanceField>(problem: &Problem<'_, F>) -> Self {
         let layout = problem.layout;
         let here = Derivatives::new(layout);
+        let zeros = vec![0.0; layout.size()];
+        let rows = Rows::of_samples(problem.sample_count(), layout);
         Self {
             factor: here.hessian.clone(),
             there: here.clone(),
             here,
-            step: x.to_vec(),
-            gradient: x.to_vec(),
-            product: x.to_vec(),
-            trial: x.to_vec(),
+            step: zeros.clone(),
+            gradient: zeros.clone(),
+            product: zeros.clone(),
+            trial: zeros,
             natural: problem.natural(),
             multipliers: vec![[0.0; 2]; layout.pieces],
             next_multipliers: vec![[0.0; 2]; layout.pieces],
+            taken: Vec::with_capacity(rows.rows.capacity()),
+            rows,
         }
     }
 
@@ -155,10 +171,11 @@ impl Workspace {
         x: &[f64],
         cost: f64,
         damping: f64,
-        rows: &[Row],
     ) -> Option<Merit> {
-        let mut taken: Vec<bool> =
-            rows.iter().map(|row| problem.after(row, &self.step) > 0.0 && row.value < 0.0).collect();
+        self.taken.clear();
+        for (k, row) in self.rows.rows.iter().enumerate() {
+            self.taken.push(row.value < 0.0 && row.value + problem.along(row.piece, self.rows.by(k), &self.step) > 0.0);
+        }
         loop {
             self.factor.copy_from(&self.here.hessian);
             self.gradient.copy_from_slice(&self.here.gradient);
@@ -166,8 +183,8 @@ impl Workspace {
                 let diagonal = (self.here.hessian.diagonal(i) - self.here.stiff[i]).max(0.0);
                 *self.factor.entry(i, i) += damping * (natural + DIAGONAL_SHARE * diagonal);
             }
-            for (row, _) in rows.iter().zip(&taken).filter(|(_, taken)| **taken) {
-                problem.add_row(row, &mut self.gradient, &mut self.factor);
+            for (k, row) in self.rows.rows.iter().enumerate().filter(|(k, _)| self.taken[*k]) {
+                problem.add_row(*row, self.rows.by(k), &mut self.gradient, &mut self.factor);
             }
             if !self.factor.factor() {
                 return None;
@@ -177,9 +194,10 @@ impl Workspace {
             }
             self.factor.solve(&mut self.step);
             let mut more = false;
-            for (row, taken) in rows.iter().zip(&mut taken) {
-                if !*taken && row.value < 0.0 && problem.after(row, &self.step) > 0.0 {
-                    *taken = true;
+            for (k, row) in self.rows.rows.iter().enumerate() {
+                let after = row.value + problem.along(row.piece, self.rows.by(k), &self.step);
+                if !self.taken[k] && row.value < 0.0 && after > 0.0 {
+                    self.taken[k] = true;
                     more = true;
                 }
             }
@@ -196,8 +214,8 @@ impl Workspace {
         for ((step, gradient), product) in self.step.iter().zip(&self.here.gradient).zip(&self.product) {
             merit.predicted += step * (gradient + 0.5 * product);
         }
-        for (row, _) in rows.iter().zip(&taken).filter(|(_, taken)| **taken) {
-            let after = problem.after(row, &self.step).max(0.0);
+        for (k, row) in self.rows.rows.iter().enumerate().filter(|(k, _)| self.taken[*k]) {
+            let after = (row.value + problem.along(row.piece, self.rows.by(k), &self.step)).max(0.0);
             merit.predicted += 0.5 * row.weight * after * after;
         }
         for piece in 0..self.multipliers.len() {
@@ -228,7 +246,7 @@ impl Workspace {
         mut cost: f64,
         tolerance: f64,
     ) -> f64 {
-        let none = vec![[0.0; 2]; self.multipliers.len()];
+        self.next_multipliers.fill([0.0; 2]);
         for _ in 0..6 {
             if largest(&self.here.gaps) <= tolerance {
                 break;
@@ -241,7 +259,7 @@ impl Workspace {
                 break;
             }
             self.step.fill(0.0);
-            for piece in 0..none.len() {
+            for piece in 0..self.next_multipliers.len() {
                 for axis in 0..2 {
                     let force = STIFFNESS * self.here.gaps[piece][axis];
                     problem.pull(piece, force, self.here.by_gap(piece, axis), &mut self.step);
@@ -249,7 +267,7 @@ impl Workspace {
             }
             self.factor.solve(&mut self.step);
             x.iter_mut().zip(&self.step).for_each(|(x, step)| *x += step);
-            cost = problem.evaluate(x, &none, &mut self.here);
+            cost = problem.evaluate(x, &self.next_multipliers, &mut self.here);
         }
         cost
     }
@@ -261,15 +279,4 @@ fn price(multiplier: f64, gap: f64) -> f64 {
 
 fn largest(gaps: &[[f64; 2]]) -> f64 {
     gaps.iter().flatten().fold(0.0f64, |most, gap| most.max(gap.abs()))
-}
-
-/// Of each sample the points that are deepest in.
-fn deepest(contacts: &[Contact]) -> Vec<Contact> {
-    let mut found: Vec<Contact> = Vec::new();
-    for of_sample in contacts.chunk_by(|a, b| (a.piece, a.sample) == (b.piece, b.sample)) {
-        let mut own = of_sample.to_vec();
-        own.sort_by(|a, b| b.short.total_cmp(&a.short));
-        found.extend(own.into_iter().take(POINTS));
-    }
-    found
 }

@@ -1,4 +1,5 @@
 use super::guess::{Guess, guess};
+use super::near::Rows;
 use super::problem::{Derivatives, Problem, STIFFNESS, Weights};
 use super::*;
 use crate::geom::Pose2;
@@ -56,7 +57,7 @@ fn the_gradient_matches_finite_differences() {
         let multipliers: Vec<[f64; 2]> = (0..first.layout.pieces).map(|k| [0.3 * k as f64, -0.2]).collect();
         let mut at = Derivatives::new(first.layout);
         assert!(problem.evaluate(&x, &multipliers, &mut at) > 20.0);
-        assert!(problem.contacts.len() > 5, "{} contour points are near", problem.contacts.len());
+        assert!(problem.contacts.as_slice().len() > 5, "{} contour points are near", problem.contacts.as_slice().len());
         let gradient = at.gradient.clone();
         // The gaps' share is that of the multipliers and of their stiff square.
         let mut whole = |x: &[f64]| {
@@ -121,6 +122,53 @@ fn the_hessian_is_that_of_the_squares_where_all_limits_are_kept() {
 }
 
 #[test]
+fn iterating_allocates_nothing() {
+    for joints in [0, 1, 2] {
+        let (path, field) = mixed(joints);
+        let robot = robot(joints);
+        let first = guess(&path, &Limits::new(&robot, 1.0)).expect("it moves");
+        let mut problem = problem(&robot, &field, &first);
+        let mut x = disturbed(&first);
+        let mut work = Workspace::new(&problem);
+        let options = SolverOptions { max_iterations: 40, tolerance: 0.0, gap_tolerance: 1e-9 };
+        let mut solved = None;
+        let asked = allocation_counter::measure(|| solved = Some(solve(&mut problem, &mut x, &options, &mut work)));
+        assert!(solved.is_some_and(|solved| solved.iterations >= 40));
+        assert_eq!(asked.count_total, 0, "{joints} joints");
+    }
+}
+
+#[test]
+fn tension_along_the_way_resists_turning_as_the_hessian_says() {
+    let robot = robot(0);
+    let path = path(0, &[(0.0, 3.0, 0.0)]);
+    let first = guess(&path, &Limits::new(&robot, 1.0)).expect("it moves");
+    let field = Boxes(vec![]);
+    let mut problem = problem(&robot, &field, &first);
+    // Nothing but time and the gaps counts.
+    problem.weights.smoothness = 0.0;
+    problem.weights.motion = 0.0;
+    let (layout, x) = (first.layout, first.x);
+    let pull = 0.7;
+    let heading = layout.state(1, layout::HEADING, 0);
+    let mut gradient = |x: &[f64], pull: f64| {
+        let mut at = Derivatives::new(layout);
+        problem.evaluate(x, &vec![[-pull, 0.0]; layout.pieces], &mut at);
+        (at.gradient[heading], at.hessian.diagonal(heading))
+    };
+    // What the stiff gaps do is there without tension too.
+    let mut slope = |pull: f64| {
+        let moved =
+            |by: f64| x.iter().enumerate().map(|(i, x)| if i == heading { x + by } else { *x }).collect::<Vec<_>>();
+        (gradient(&moved(1e-5), pull).0 - gradient(&moved(-1e-5), pull).0) / 2e-5
+    };
+    let numeric = slope(pull) - slope(0.0);
+    let by_hessian = gradient(&x, pull).1 - gradient(&x, 0.0).1;
+    assert!(numeric > 0.1, "{numeric}");
+    assert!((by_hessian / numeric - 1.0).abs() < 0.02, "{by_hessian} {numeric}");
+}
+
+#[test]
 fn points_linearised_at_a_place_move_as_they_say() {
     let (path, field) = mixed(1);
     let robot = robot(1);
@@ -130,22 +178,27 @@ fn points_linearised_at_a_place_move_as_they_say() {
     let mut at = Derivatives::new(first.layout);
     let zero = vec![[0.0; 2]; first.layout.pieces];
     problem.evaluate(&x, &zero, &mut at);
-    let contacts = problem.contacts.clone();
-    let rows = problem.rows(&x, &contacts);
-    assert_eq!(rows.len(), contacts.len());
-    for (row, contact) in rows.iter().zip(&contacts) {
+    let contacts = problem.contacts.as_slice().to_vec();
+    let rows = |problem: &mut Problem<'_, Boxes>, x: &[f64]| {
+        let mut rows = Rows::of_samples(0, first.layout);
+        problem.linearise_contacts(x, &mut rows);
+        rows
+    };
+    let here = rows(&mut problem, &x);
+    assert_eq!(here.rows.len(), contacts.len());
+    for (row, contact) in here.rows.iter().zip(&contacts) {
         assert!((row.value - contact.short / WEIGHTS.clearance_unit).abs() < 1e-9);
     }
     // A small step changes each value as its row says; durations too, by what they do to the data.
     let step: Vec<f64> =
         (0..x.len()).map(|i| if first.fixed[i] { 0.0 } else { ((i * 29) % 13) as f64 / 13.0 - 0.5 }).collect();
     let moved = |share: f64| -> Vec<f64> { x.iter().zip(&step).map(|(x, s)| x + share * s).collect() };
-    let (up, down) = (problem.rows(&moved(1e-6), &contacts), problem.rows(&moved(-1e-6), &contacts));
+    let (up, down) = (rows(&mut problem, &moved(1e-6)), rows(&mut problem, &moved(-1e-6)));
     let by_time = first.layout.local_time();
-    for ((row, up), down) in rows.iter().zip(&up).zip(&down) {
+    for (k, ((row, up), down)) in here.rows.iter().zip(&up.rows).zip(&down.rows).enumerate() {
         // The row is of the weighted square's root: its derivative by the duration holds half the value besides.
         let of_weight = 0.5 * row.value * step[row.piece * first.layout.block() + first.layout.offsets()[by_time]];
-        let slope = problem.along(row.piece, &row.by, &step) - of_weight;
+        let slope = problem.along(row.piece, here.by(k), &step) - of_weight;
         let numeric = (up.value - down.value) / 2e-6;
         assert!((slope - numeric).abs() < 1e-4 * (1.0 + numeric.abs()), "{slope} {numeric}");
     }
@@ -210,8 +263,10 @@ fn a_robot_that_changes_shape_passes_a_gap() {
         robot.body_poses(&[curve.jet(2, place)[0]], &mut poses);
         let base = curve.pose(place).isometry();
         for shape in &contour.shapes {
-            for point in &contour.points[shape.patches[0].first..shape.patches[0].last] {
-                let distance = field.distance((base * poses[shape.body] * point.at).coords.into()) - point.radius;
+            let own = shape.patches.first().map_or(0..0, |whole| whole.first..whole.last);
+            for point in &contour.points[own] {
+                let at = (base * poses[shape.body] * point.at).coords.into();
+                let distance = field.least_above(at, point.rise).0 - point.radius;
                 assert!(distance > 0.02, "{distance} at {k}");
             }
         }

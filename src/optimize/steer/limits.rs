@@ -1,0 +1,119 @@
+//! What a sample exceeds of the limits of base, wheels and joints: squares of what is too much.
+
+use super::hermite::{Basis, DATA};
+use super::integral::ByData;
+use super::problem::Problem;
+
+/// Backing up weighs as much as exceeding the speed limit by so many times as much.
+const BACKWARDS: f64 = 10.0;
+
+impl<F> Problem<'_, F> {
+    /// Limits of base and wheels: each is linear in one derivative of heading and arc length. At rest the speed is what it is, and
+    /// the jerk must not point backwards.
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn base_limits(
+        &mut self,
+        piece: usize,
+        rest: bool,
+        basis: &Basis,
+        heading: &[f64; 4],
+        arc: &[f64; 4],
+        rates: &[f64; 4],
+        weight: f64,
+    ) -> f64 {
+        let limits = &self.limits;
+        let direction = self.directions[piece];
+        let arm = limits.half_track;
+        let local = &mut self.local;
+        let mut cost = 0.0;
+        // `by . (heading, arc length)` of an order exceeds its bound by `value`; the sum is homogeneous in time of minus the order.
+        let mut row = |order: usize, by: [f64; 2], value: f64, bound: f64| {
+            let scaled = by.map(|b| b * rates[order]);
+            let jacobian: ByData = std::array::from_fn(|k| scaled[k / DATA] * basis.rows[order][k % DATA]);
+            let by_time = 0.5 * value - order as f64 * (value + bound);
+            cost += local.square_of_base(&jacobian, by_time, value, weight);
+        };
+        let (turn, along) = (heading[1] * rates[1], direction * arc[1] * rates[1]);
+        let side = turn.signum();
+        let over = |value: f64, limit: f64| value / limit - 1.0;
+        let speed = over(along, limits.speed);
+        if speed > 0.0 {
+            row(1, [0.0, direction / limits.speed], speed, 1.0);
+        }
+        let floor = self.floors[piece];
+        if along < floor && !rest {
+            // As if it were by so many limits: there is nothing to gain from it.
+            let unit = limits.speed / BACKWARDS;
+            row(1, [0.0, -direction / unit], (floor - along) / unit, -floor / unit);
+        }
+        let push = direction * arc[3] * rates[3] / self.rim_jerk;
+        if push < 0.0 && rest {
+            row(3, [0.0, -direction / self.rim_jerk], -push, 0.0);
+        }
+        let at_rest = limits.turn_slope * limits.speed;
+        let eq14 = over(side * turn + limits.turn_slope * along, at_rest);
+        if eq14 > 0.0 {
+            row(1, [side / at_rest, direction * limits.turn_slope / at_rest], eq14, 1.0);
+        }
+        let cap = over(side * turn, limits.angular_speed);
+        if cap > 0.0 {
+            row(1, [side / limits.angular_speed, 0.0], cap, 1.0);
+        }
+        let rim = over(along + arm * side * turn, limits.rim_speed);
+        if rim > 0.0 {
+            row(1, [side * arm / limits.rim_speed, direction / limits.rim_speed], rim, 1.0);
+        }
+        let orders = [
+            (2, limits.acceleration, limits.angular_acceleration, limits.rim_acceleration),
+            (3, f64::INFINITY, f64::INFINITY, self.rim_jerk),
+        ];
+        for (order, base, turning, rim) in orders {
+            let (turn, along) = (heading[order] * rates[order], arc[order] * rates[order]);
+            if over(along.abs(), base) > 0.0 {
+                row(order, [0.0, along.signum() / base], over(along.abs(), base), 1.0);
+            }
+            if over(turn.abs(), turning) > 0.0 {
+                row(order, [turn.signum() / turning, 0.0], over(turn.abs(), turning), 1.0);
+            }
+            for arm in [arm, -arm] {
+                let wheel = along + arm * turn;
+                if over(wheel.abs(), rim) > 0.0 {
+                    row(order, [wheel.signum() * arm / rim, wheel.signum() / rim], over(wheel.abs(), rim), 1.0);
+                }
+            }
+        }
+        cost
+    }
+
+    /// Limits of the joints: speed, acceleration, jerk, position. Leaves the joints' values in `joints`.
+    pub(super) fn joint_limits(&mut self, basis: &Basis, rates: &[f64; 4], weight: f64) -> f64 {
+        let mut cost = 0.0;
+        for (index, limits) in self.limits.joints.iter().enumerate() {
+            let first = DATA * (2 + index);
+            let unit = basis.at(&self.data[2 + index]);
+            self.joints[index] = unit[0];
+            let local = &mut self.local;
+            let mut row = |order: usize, factor: f64, value: f64, bound: f64| {
+                let jacobian = basis.rows[order].map(|b| factor * rates[order] * b);
+                let by_time = 0.5 * value - order as f64 * (value + bound);
+                cost += local.square_of_joint(first, &jacobian, by_time, value, weight);
+            };
+            let bounds = [limits.speed, limits.acceleration, self.joint_jerks[index]];
+            for (order, bound) in (1..).zip(bounds) {
+                let value = unit[order] * rates[order];
+                if value.abs() > bound {
+                    row(order, value.signum() / bound, value.abs() / bound - 1.0, 1.0);
+                }
+            }
+            // Positions have no natural size; half the range is it, as a limit's distance from the middle. Unbounded: none.
+            let half_range = 0.5 * (limits.upper - limits.lower);
+            let size = if half_range.is_finite() && half_range > 1e-6 { half_range } else { 1.0 };
+            if unit[0] > limits.upper {
+                row(0, 1.0 / size, (unit[0] - limits.upper) / size, 0.0);
+            } else if unit[0] < limits.lower {
+                row(0, -1.0 / size, (limits.lower - unit[0]) / size, 0.0);
+            }
+        }
+        cost
+    }
+}
