@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::inputs::{self, Disk};
+use super::inputs::{self, Disk, Named};
 use super::output::{self, depfile, spelled};
 use super::terminal::Terminal;
 use crate::diag::{Diagnostic, Diagnostics, Severity};
@@ -172,7 +172,8 @@ fn command_files(
             robot_yaml: inputs.robot_yaml.as_ref().map(|f| f.text.as_str()),
             urdf: &inputs.urdf.text,
             report,
-            meshes: &disk.meshes(),
+            path_csv: inputs.path_csv.as_ref().map(|f| f.text.as_str()),
+            meshes: &meshes(inputs, disk, &start),
         })?;
         files.push(("commands.mcap", bytes));
     }
@@ -181,6 +182,13 @@ fn command_files(
     let read: Vec<PathBuf> = disk.paths().iter().map(|p| spelled(p, &start)).collect();
     files.push(("commands.d", depfile(&spelled(&folder.join(target), &start), &read).into_bytes()));
     Ok(files)
+}
+
+/// Meshes by their paths from the URDF's folder.
+fn meshes(inputs: &Inputs, disk: &Disk, start: &Path) -> Vec<Named> {
+    let folder = start.join(inputs::folder_of(Path::new(&inputs.urdf.name)));
+    let name = |path: &str| from_folder(&folder, &start.join(path));
+    disk.meshes().into_iter().map(|(path, bytes)| (name(&path), bytes)).collect()
 }
 
 /// The path that leads from a folder to a file, both absolute; with `..` where needed.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::check::{mission_of, read_commands};
+use super::inputs::commands::{self, Places};
 use super::inputs::{self, Disk, read_map_file, read_robot_files};
 use super::plot;
 use super::terminal::Terminal;
@@ -154,7 +154,7 @@ fn of_mission(path: &Path) -> Result<Understood, Diagnostics> {
 }
 
 fn of_commands(path: &Path) -> Result<Understood, Diagnostics> {
-    let file = read_commands(path)?;
+    let file = commands::read(path)?;
     let table = &file.table;
     let driven = metrics::of_commands(table);
     let mut out = format!("commands {}\n", path.display());
@@ -184,7 +184,8 @@ fn of_commands(path: &Path) -> Result<Understood, Diagnostics> {
         }
     }
     // Drawn with its mission's robot and map, where these are at hand.
-    let world = mission_of(path, &file.header, None).and_then(|(mut inputs, _)| pipeline::world(&mut inputs)).ok();
-    let figure = plot::commands(&path.display().to_string(), table, world.as_ref());
+    let name = path.display().to_string();
+    let world = file.clone().load(Places::default()).map(|loaded| loaded.world).ok();
+    let figure = plot::commands(&name, &file.table, world.as_ref());
     Ok((out, figure))
 }

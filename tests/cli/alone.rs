@@ -1,0 +1,88 @@
+//! `commands.mcap` verifies with nothing beside it but the map.
+
+use super::sandbox::{Sandbox, golden};
+
+/// A sandbox with nothing in it but `here/commands.mcap` of another, and its folder of maps as `here/`.
+fn only_the_file(from: &Sandbox, map: Option<&str>) -> Sandbox {
+    let alone = Sandbox::empty();
+    alone.write("here/commands.mcap", from.read("out/a/commands.mcap"));
+    if let Some(map) = map {
+        alone.write("here/first.csv", from.read(map));
+    }
+    alone
+}
+
+/// A bad file's message.
+fn complaint(sandbox: &Sandbox, args: &[&str]) -> String {
+    let run = sandbox.run(args).expect(2);
+    assert_eq!(run.stdout, "");
+    run.stderr
+}
+
+#[test]
+fn a_copy_with_the_map_beside_it_is_all_that_check_needs() {
+    let alone = only_the_file(&Sandbox::compiled(), Some("maps/first.csv"));
+    let run = alone.run(&["check", "here/commands.mcap"]).expect(0);
+    assert!(run.stdout.contains("all checks hold") && !run.stdout.contains("note"), "{}", run.stdout);
+    assert!(
+        run.stdout.contains("against       the mission and robot that it brings, map here/first.csv\n"),
+        "{}",
+        run.stdout
+    );
+    alone.run_in("here", &["check", "commands.mcap"]).expect(0);
+    alone.run(&["path-error", "here/commands.mcap", "--sampling-times", "0.1"]).expect(0);
+}
+
+#[test]
+fn a_map_elsewhere_is_found_when_it_is_said_where() {
+    let alone = only_the_file(&Sandbox::compiled(), Some("maps/first.csv"));
+    std::fs::rename(alone.path("here/first.csv"), alone.path("floor.csv")).expect("rename");
+    golden("alone_map_missing", &complaint(&alone, &["check", "here/commands.mcap"]));
+    alone.run(&["check", "here/commands.mcap", "--map", "floor.csv"]).expect(0);
+    golden("alone_map_not_there", &complaint(&alone, &["check", "here/commands.mcap", "--map", "flor.csv"]));
+}
+
+#[test]
+fn another_map_is_not_taken_for_the_one_planned_on() {
+    let alone = only_the_file(&Sandbox::compiled(), Some("maps/first.csv"));
+    alone.write("here/first.csv", alone.text("here/first.csv") + "0.125,0.125,0.000\n");
+    golden("alone_map_differs", &complaint(&alone, &["check", "here/commands.mcap"]));
+    complaint(&alone, &["check", "here/commands.mcap", "--map", "here/first.csv"]);
+}
+
+#[test]
+fn the_attached_mission_counts_and_not_the_one_on_the_disk() {
+    let sandbox = Sandbox::compiled();
+    sandbox.edit("missions/a.yaml", "clearance_m: 0.05", "clearance_m: 0.2");
+    sandbox.run(&["check", "out/a/commands.mcap"]).expect(0);
+    sandbox.run(&["check", "out/a/commands.csv"]).expect(1);
+    sandbox.run(&["check", "out/a/commands.mcap", "--mission", "missions/a.yaml"]).expect(1);
+}
+
+#[test]
+fn meshes_urdf_alone_and_a_given_path_come_along() {
+    let sandbox = Sandbox::new();
+    let tetrahedron = "v 0.2 0.2 0\nv -0.2 0.2 0\nv 0 -0.2 0\nv 0 0 0.2\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 1 3 4\n";
+    for folder in ["robots/own/meshes", "robots/own/urdf/left"] {
+        sandbox.write(&format!("{folder}/hull.obj"), tetrahedron);
+    }
+    let meshes = ["../meshes/hull.obj", "package://own/urdf/left/hull.obj"].map(|name| {
+        format!(r#"<collision><origin xyz="0 0 0.1"/><geometry><mesh filename="{name}"/></geometry></collision>"#)
+    });
+    let urdf =
+        sandbox.text("robots/box_base/box_base.urdf").replacen("<collision>", &(meshes.concat() + "<collision>"), 1);
+    let wheel = r#"<collision><geometry><sphere radius="0.08"/></geometry></collision>"#;
+    let urdf = ["left", "right"].iter().fold(urdf, |urdf, side| {
+        urdf.replace(
+            &format!(r#"<link name="{side}_wheel"/>"#),
+            &format!(r#"<link name="{side}_wheel">{wheel}</link>"#),
+        )
+    });
+    sandbox.write("robots/own/urdf/own.urdf", urdf);
+    sandbox.write("missions/way.csv", "x_m,y_m\n1,1\n2,1.1\n3,1\n");
+    sandbox.write("missions/a.yaml", "robot: ../robots/own/urdf/own.urdf\npath: {file: way.csv}\n");
+    sandbox.run(&["compile", "missions/a.yaml"]).expect(0);
+    let alone = only_the_file(&sandbox, None);
+    let run = alone.run(&["check", "here/commands.mcap"]).expect(0);
+    assert!(!run.stdout.contains("map"), "{}", run.stdout);
+}
