@@ -61,19 +61,29 @@ pub(super) fn joint_columns(name: &str, prismatic: bool) -> [String; 2] {
 /// values become spaces and surrounding spaces are lost.
 pub fn write(table: &CommandTable, header: &CsvHeader) -> String {
     let mut text: String = head(table, header).iter().map(|(key, value)| format!("# {key}: {value}\n")).collect();
+    text += &line(&columns(table));
+    for k in 0..table.rows.len() {
+        text += &line(&cells(table, k).into_iter().map(number).collect::<Vec<_>>());
+    }
+    text
+}
+
+/// Names of the columns.
+pub(super) fn columns(table: &CommandTable) -> Vec<String> {
     let mut columns: Vec<String> =
         ["time_s", "wheel_left_rad_s", "wheel_right_rad_s", "v_mps", "omega_rad_s"].map(String::from).into();
     columns.extend(table.joints.iter().flat_map(|(name, prismatic)| joint_columns(name, *prismatic)));
     columns.extend(["x_m", "y_m", "yaw_rad"].map(String::from));
-    text += &line(&columns);
-    for (k, row) in table.rows.iter().enumerate() {
-        let (v, omega) = table.twist(k);
-        let mut cells = vec![table.time(k), row.wheel_left, row.wheel_right, v, omega];
-        cells.extend(row.joint_positions.iter().zip(&row.joint_velocities).flat_map(|(p, v)| [*p, *v]));
-        cells.extend([row.pose.x, row.pose.y, row.pose.yaw]);
-        text += &line(&cells.into_iter().map(number).collect::<Vec<_>>());
-    }
-    text
+    columns
+}
+
+/// Row `k`, a number for each column.
+pub(super) fn cells(table: &CommandTable, k: usize) -> Vec<f64> {
+    let (row, (v, omega)) = (&table.rows[k], table.twist(k));
+    let mut cells = vec![table.time(k), row.wheel_left, row.wheel_right, v, omega];
+    cells.extend(row.joint_positions.iter().zip(&row.joint_velocities).flat_map(|(p, v)| [*p, *v]));
+    cells.extend([row.pose.x, row.pose.y, row.pose.yaw]);
+    cells
 }
 
 /// The bytes of `path_error.csv`; a clearance that is unknown or without bound is an empty cell.

@@ -12,7 +12,7 @@ use crate::command::CommandTable;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::emit::csv::{self, CsvHeader};
 use crate::emit::mcap::attached;
-use crate::emit::mcap_read::{self, Attached};
+use crate::emit::mcap_read::{self, Attached, Topic};
 use crate::mission;
 use crate::pipeline::{self, Inputs, World};
 use crate::report::Report;
@@ -34,6 +34,8 @@ pub struct CommandFile {
     pub contradictions: Vec<Diagnostic>,
     /// What is attached; empty: a CSV file.
     pub attachments: Vec<Attached>,
+    /// The topics of an MCAP file.
+    pub topics: Vec<Topic>,
     /// The report that is attached.
     pub report: Option<Report>,
 }
@@ -57,7 +59,7 @@ pub struct LoadedCommands {
     pub world: World,
     /// Where mission and robot come from.
     pub origin: Origin,
-    /// Mission, robot and map are byte for byte those that the file was made from.
+    /// Mission, robot and map are byte for byte those that the file was made from. False where the map was left out.
     pub as_made: bool,
 }
 
@@ -90,7 +92,8 @@ pub fn read(path: &Path) -> Result<CommandFile, Diagnostics> {
         let text = disk.text(path, None)?;
         let (table, header, contradictions) = csv::read_to_judge(&name, &text.text)?;
         let path = path.to_path_buf();
-        return Ok(CommandFile { path, table, header, contradictions, attachments: Vec::new(), report: None });
+        let (attachments, topics) = (Vec::new(), Vec::new());
+        return Ok(CommandFile { path, table, header, contradictions, attachments, topics, report: None });
     }
     let file = mcap_read::read(&name, &disk.binary(path, None)?)?;
     let report = match file.attachment(attached::REPORT) {
@@ -106,6 +109,7 @@ pub fn read(path: &Path) -> Result<CommandFile, Diagnostics> {
         header: file.header,
         contradictions: Vec::new(),
         attachments: file.attachments,
+        topics: file.topics,
         report,
     })
 }

@@ -1,5 +1,9 @@
 //! `commands.mcap` verifies with nothing beside it but the map.
 
+use trajc::emit::mcap::{self, McapInputs, attached};
+use trajc::emit::mcap_read;
+use trajc::robot::{self, NoFiles, RobotInputs, spec};
+
 use super::sandbox::{Sandbox, golden};
 
 /// A sandbox with nothing in it but `here/commands.mcap` of another, and its folder of maps as `here/`.
@@ -85,4 +89,67 @@ fn meshes_urdf_alone_and_a_given_path_come_along() {
     let alone = only_the_file(&sandbox, None);
     let run = alone.run(&["check", "here/commands.mcap"]).expect(0);
     assert!(!run.stdout.contains("map"), "{}", run.stdout);
+    let text = alone.run(&["inspect", "here/commands.mcap"]).expect(0).stdout;
+    for name in ["path.csv", "meshes/left/hull.obj", "meshes/../meshes/hull.obj"] {
+        assert!(text.contains(name), "{name}: {text}");
+    }
+}
+
+/// The texts that are attached.
+struct Texts {
+    mission: String,
+    robot_yaml: Option<String>,
+    urdf: String,
+    report: String,
+}
+
+/// The file with other attachments, everything else as it was.
+fn rewritten(bytes: &[u8], change: impl Fn(&mut Texts)) -> Vec<u8> {
+    let file = mcap_read::read("a.mcap", bytes).expect("a command file");
+    let text = |name: &str| String::from_utf8(file.attachment(name).expect(name).to_vec()).expect("text");
+    let [mission, robot_yaml, urdf, report] =
+        [attached::MISSION, attached::ROBOT, attached::URDF, attached::REPORT].map(text);
+    let spec = spec::parse("robot.yaml", &robot_yaml).expect("a robot.yaml");
+    let urdf_file = ("robot.urdf", urdf.as_str());
+    let parts = RobotInputs { spec: &spec, urdf: urdf_file, files: &mut NoFiles, overrides: &Default::default() };
+    let robot = robot::parse(parts).expect("a robot");
+    let mut texts = Texts { mission, robot_yaml: Some(robot_yaml), urdf, report };
+    change(&mut texts);
+    let inputs = McapInputs {
+        table: &file.table,
+        header: &file.header,
+        robot: &robot,
+        mission: &texts.mission,
+        robot_yaml: texts.robot_yaml.as_deref(),
+        urdf: &texts.urdf,
+        report: &texts.report,
+        path_csv: None,
+        meshes: &[],
+    };
+    mcap::write(&inputs).expect("a command file")
+}
+
+#[test]
+fn attachments_that_the_commands_were_not_made_from_are_refused() {
+    let sandbox = Sandbox::compiled();
+    let bytes = sandbox.read("out/a/commands.mcap");
+    let changed = |change: &dyn Fn(&mut Texts)| {
+        sandbox.write("out/a/commands.mcap", rewritten(&bytes, change));
+        complaint(&sandbox, &["check", "out/a/commands.mcap"])
+    };
+    sandbox.write("out/a/commands.mcap", rewritten(&bytes, |_| {}));
+    sandbox.run(&["check", "out/a/commands.mcap"]).expect(0);
+
+    let faster = |texts: &mut Texts| {
+        texts.robot_yaml = texts.robot_yaml.as_ref().map(|text| text.replace("speed_mps: 0.5", "speed_mps: 0.9"));
+    };
+    golden("alone_robot_differs", &changed(&faster));
+    let text = changed(&|texts| texts.mission = texts.mission.replace("clearance_m: 0.05", "clearance_m: 0.01"));
+    assert!(text.contains("the attached `mission.yaml` is not what the commands were made from"), "{text}");
+    let text = changed(&|texts| texts.urdf = texts.urdf.replace("0.40 0.40", "0.10 0.10"));
+    assert!(text.contains("the attached `robot.urdf` is not"), "{text}");
+    golden("alone_report_garbage", &changed(&|texts| texts.report = "{}".into()));
+    golden("alone_robot_not_attached", &changed(&|texts| texts.robot_yaml = None));
+    // With a mission of one's own what is attached does not count.
+    sandbox.run(&["check", "out/a/commands.mcap", "--mission", "missions/a.yaml"]).expect(0);
 }
