@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use super::inputs::commands::{self, LoadedCommands, Origin, Places};
 use super::terminal::Terminal;
-use crate::certify::{Certificate, END_ANGLE_TOLERANCE, END_POINT_TOLERANCE};
+use crate::certify::Certificate;
 use crate::diag::Diagnostics;
+use crate::report::schema::{CertificatePart, LimitPart};
+use crate::report::summary;
 
 /// Check a command file against its robot, map, limits and goal, without planning anything.
 ///
@@ -43,8 +45,8 @@ pub fn check(args: &CheckArgs, terminal: &mut Terminal) -> Result<u8, Diagnostic
 }
 
 fn json(loaded: &LoadedCommands, certificate: &Certificate) -> String {
-    let part: crate::report::schema::CertificatePart = certificate.into();
-    let limits: Vec<crate::report::schema::LimitPart> = certificate.limits.iter().map(Into::into).collect();
+    let part: CertificatePart = certificate.into();
+    let limits: Vec<LimitPart> = certificate.limits.iter().map(Into::into).collect();
     let refusals: Vec<&str> = certificate.refusals.iter().map(|r| r.message.as_str()).collect();
     let value = serde_json::json!({
         "holds": certificate.holds(), "certificate": part, "limits": limits, "refusals": refusals,
@@ -55,26 +57,18 @@ fn json(loaded: &LoadedCommands, certificate: &Certificate) -> String {
 
 fn readable(loaded: &LoadedCommands, certificate: &Certificate) -> String {
     let verdict = if certificate.holds() { "all checks hold" } else { "CHECKS FAIL" };
-    let mut out = format!("{}: {verdict}\n", loaded.file.path.display());
-    out += &format!("  against       {}\n", against(loaded));
-    let mm = |v: f64| format!("{:.3} mm", v * 1e3);
-    if let (Some(proven), Some(required)) = (certificate.clearance_proven, certificate.clearance_required) {
-        out += &format!("  clearance     {} proven, {} required\n", mm(proven), mm(required));
-    }
-    out += &format!("  end point     {} off, {} allowed\n", mm(certificate.end_point_error), mm(END_POINT_TOLERANCE));
-    if let Some(heading) = certificate.end_heading_error {
-        let degrees = |v: f64| format!("{:.4} deg", v.to_degrees());
-        out += &format!("  end heading   {} off, {} allowed\n", degrees(heading), degrees(END_ANGLE_TOLERANCE));
-    }
-    for limit in &certificate.limits {
-        let bound = limit.limit.map_or("no limit given".to_owned(), |l| format!("limit {l}"));
-        out += &format!("  {:<24} peak {:.6}, {bound}\n", format!("{} {}", limit.actuator, limit.quantity), limit.peak);
-    }
+    let mut out = format!("{}: {verdict}\n\n", loaded.file.path.display());
+    summary::line(&mut out, "against", &against(loaded));
+    let joints = &loaded.world.robot.joints;
+    let prismatic = |name: &str| joints.iter().any(|j| j.name == name && j.prismatic);
+    let limits: Vec<LimitPart> = certificate.limits.iter().map(Into::into).collect();
+    summary::proof(&mut out, &certificate.into(), &limits, &prismatic);
     for refusal in &certificate.refusals {
-        out += &format!("  refused: {}\n", refusal.message);
+        summary::line(&mut out, "refused", &refusal.message);
     }
     if !loaded.as_made {
-        out += "  note: the mission, robot or map are not the ones that the file was made from\n";
+        let note = "the mission, robot or map are not the ones that the file was made from";
+        summary::line(&mut out, "note", note);
     }
     out
 }

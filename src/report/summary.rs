@@ -4,7 +4,7 @@ mod limits;
 
 use std::fmt::Write;
 
-use super::schema::{CertificatePart, Report, Status};
+use super::schema::{CertificatePart, LimitPart, Report, Status};
 use crate::certify::{END_ANGLE_TOLERANCE, END_POINT_TOLERANCE};
 pub use limits::table as limits_table;
 
@@ -45,10 +45,8 @@ fn certified(inputs: &SummaryInputs<'_>) -> String {
     let mut out = format!("{}: {}\n\n", inputs.mission, paint("CERTIFIED", 32, inputs.colour));
     motion(&mut out, report);
     if let Some(certificate) = &report.certificate {
-        clearance(&mut out, certificate);
-        goal(&mut out, certificate);
+        proof(&mut out, certificate, &report.limits, &prismatic(report));
     }
-    limits(&mut out, report);
     path_error(&mut out, report);
     files(&mut out, inputs);
     out += "\nProven of the model; wheel slip and tracking errors are not in it.\n";
@@ -67,10 +65,24 @@ fn failed(inputs: &SummaryInputs<'_>) -> String {
     motion(&mut out, report);
     if let Some(certificate) = &report.certificate {
         clearance(&mut out, certificate);
-        limits(&mut out, report);
+        limits(&mut out, &report.limits, &prismatic(report));
     }
     files(&mut out, inputs);
+    // The diagnostic follows.
+    out.push('\n');
     out
+}
+
+/// Lines that tell what a certificate says. `prismatic`: which joints are measured in metres.
+pub fn proof(out: &mut String, certificate: &CertificatePart, peaks: &[LimitPart], prismatic: &dyn Fn(&str) -> bool) {
+    clearance(out, certificate);
+    goal(out, certificate);
+    limits(out, peaks, prismatic);
+}
+
+fn prismatic(report: &Report) -> impl Fn(&str) -> bool {
+    let joints = report.robot.as_ref().map_or(&[][..], |r| &r.joints);
+    move |name| joints.iter().any(|j| j.name == name && j.prismatic)
 }
 
 /// Bold and in one of the terminal's eight colours.
@@ -79,7 +91,7 @@ fn paint(word: &str, colour: u8, wanted: bool) -> String {
 }
 
 /// One labelled line, broken at spaces.
-fn line(out: &mut String, label: &str, text: &str) {
+pub fn line(out: &mut String, label: &str, text: &str) {
     let mut current = format!("  {label:<12}");
     let indent = current.len();
     for word in text.split(' ') {
@@ -128,7 +140,7 @@ fn clearance(out: &mut String, certificate: &CertificatePart) {
         let what = match &closest.obstacle {
             Some(b) => {
                 let at = [0, 1, 2].map(|i| format!("{:.2}", 0.5 * (b.min[i] + b.max[i])));
-                format!("the obstacle at {} m", at.join(", "))
+                format!("the cell at ({})", at.join(", "))
             }
             None => "unseen space".to_string(),
         };
@@ -165,13 +177,11 @@ pub fn goal_text(certificate: &CertificatePart) -> Option<String> {
         missed += &format!(" and {}", degrees(heading));
         allowed += &format!(" and {}", degrees(END_ANGLE_TOLERANCE));
     }
-    Some(format!("missed by {missed}; {allowed} are allowed"))
+    Some(format!("missed by {missed}; allowed: {allowed}"))
 }
 
-fn limits(out: &mut String, report: &Report) {
-    let joints = report.robot.as_ref().map_or(&[][..], |r| &r.joints);
-    let prismatic = |name: &str| joints.iter().any(|j| j.name == name && j.prismatic);
-    let table = limits_table(&report.limits, &prismatic);
+fn limits(out: &mut String, peaks: &[LimitPart], prismatic: &dyn Fn(&str) -> bool) {
+    let table = limits_table(peaks, prismatic);
     if table.is_empty() {
         return;
     }

@@ -29,7 +29,7 @@ fn a_copy_with_the_map_beside_it_is_all_that_check_needs() {
     let run = alone.run(&["check", "here/commands.mcap"]).expect(0);
     assert!(run.stdout.contains("all checks hold") && !run.stdout.contains("note"), "{}", run.stdout);
     assert!(
-        run.stdout.contains("against       the mission and robot that it brings, map here/first.csv\n"),
+        run.stdout.contains("against     the mission and robot that it brings, map here/first.csv\n"),
         "{}",
         run.stdout
     );
@@ -88,7 +88,7 @@ fn meshes_urdf_alone_and_a_given_path_come_along() {
     sandbox.run(&["compile", "missions/a.yaml"]).expect(0);
     let alone = only_the_file(&sandbox, None);
     let run = alone.run(&["check", "here/commands.mcap"]).expect(0);
-    assert!(!run.stdout.contains("map"), "{}", run.stdout);
+    assert!(run.stdout.contains("no map: not checked"), "{}", run.stdout);
     let text = alone.run(&["inspect", "here/commands.mcap"]).expect(0).stdout;
     for name in ["path.csv", "meshes/left/hull.obj", "meshes/../meshes/hull.obj"] {
         assert!(text.contains(name), "{name}: {text}");

@@ -94,9 +94,8 @@ fn a_certified_mission_is_summed_up_on_one_screen() {
       commands    424 rows of 0.1 s, sampling mean
       path        optimised, 14 pieces, 61 iterations, converged
       clearance   51.18 mm proven, 50 mm required: 1.18 mm to spare
-                  closest at 12.3 s: left_blade to the obstacle at 4.03, 4.07, 0.28
-                  m
-      goal        missed by 0.042 mm and under 0.001°; 1 mm and 0.1° are allowed
+                  closest at 12.3 s: left_blade to the cell at (4.03, 4.07, 0.28)
+      goal        missed by 0.042 mm and under 0.001°; allowed: 1 mm and 0.1°
       limits      peak/limit, and what is left of it:
         wheel_left   0.499/0.5 m/s  0%  0.312/0.5 m/s² 37%  2/2 m/s³   0%
         wheel_right  0.41/0.5 m/s  18%  0.3/∞ m/s²          1.1/∞ m/s³
@@ -133,8 +132,7 @@ fn a_refused_certificate_says_what_was_reached() {
       commands    424 rows of 0.1 s, sampling mean
       path        optimised, 14 pieces, 61 iterations, converged
       clearance   31.2 mm proven, 50 mm required: 18.8 mm short
-                  closest at 12.3 s: left_blade to the obstacle at 4.03, 4.07, 0.28
-                  m
+                  closest at 12.3 s: left_blade to the cell at (4.03, 4.07, 0.28)
       limits      peak/limit, and what is left of it:
         wheel_left   0.55/0.5 m/s OVER  0.312/0.5 m/s² 37%  2/2 m/s³   0%
         wheel_right  0.41/0.5 m/s  18%  0.3/∞ m/s²          1.1/∞ m/s³
@@ -225,9 +223,8 @@ fn a_screen_of_80_columns_holds_an_arm_and_a_robot_without_joints() {
       commands    424 rows of 0.1 s, sampling mean
       path        optimised, 14 pieces, 61 iterations, converged
       clearance   51.18 mm proven, 50 mm required: 1.18 mm to spare
-                  closest at 12.3 s: left_blade to the obstacle at 4.03, 4.07, 0.28
-                  m
-      goal        missed by 0.042 mm and under 0.001°; 1 mm and 0.1° are allowed
+                  closest at 12.3 s: left_blade to the cell at (4.03, 4.07, 0.28)
+      goal        missed by 0.042 mm and under 0.001°; allowed: 1 mm and 0.1°
       limits      peak/limit, and what is left of it:
         wheel_left     0.499/0.5 m/s   0%  0.312/0.5 m/s² 37%  2/2 m/s³        0%
         wheel_right    0.41/0.5 m/s   18%  0.3/∞ m/s²          1.1/∞ m/s³
