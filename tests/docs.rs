@@ -6,7 +6,8 @@
 //!
 //! - `<!-- file: missions/dock.yaml -->`: it is written to that file of the session.
 //! - `<!-- exit: 1 -->`: its last command ends with that code, not with 0.
-//! - `<!-- not run: needs a robot -->`: it is not run. Such blocks are counted and printed with their reasons.
+//! - `<!-- not run: needs a robot -->`, or ```` ```console,no_run ````: it is not run. Such blocks are counted and printed with
+//!   their reasons.
 //!
 //! After an intended change run with `TRAJC_DOCS=update`: outputs without `…` are rewritten. Read what moved.
 
@@ -83,7 +84,12 @@ fn blocks(text: &str) -> Vec<Block> {
             (Some(_), Some("")) => out.extend(open.take()),
             (Some(block), _) => block.body.push(text.to_owned()),
             (None, Some(language)) => {
-                let (language, notes) = (language.trim().to_owned(), std::mem::take(&mut notes));
+                let mut words = language.split([',', ' ']).map(str::trim);
+                let language = words.next().unwrap_or_default().to_owned();
+                let mut notes = std::mem::take(&mut notes);
+                if words.any(|word| word == "no_run") {
+                    notes.push(("not run".to_owned(), "no_run".to_owned()));
+                }
                 open = Some(Block { line, language, notes, body: Vec::new() });
             }
             (None, None) => match text.strip_prefix("<!-- ").and_then(|t| t.strip_suffix(" -->")?.split_once(": ")) {

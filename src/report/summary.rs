@@ -90,6 +90,9 @@ fn paint(word: &str, colour: u8, wanted: bool) -> String {
     if wanted { format!("\x1b[1;{colour}m{word}\x1b[0m") } else { word.to_owned() }
 }
 
+/// Holds words together where a line is broken.
+const TIE: &str = "\u{a0}";
+
 /// One labelled line, broken at spaces.
 pub fn line(out: &mut String, label: &str, text: &str) {
     let mut current = format!("  {label:<12}");
@@ -102,7 +105,7 @@ pub fn line(out: &mut String, label: &str, text: &str) {
         if current.len() > indent {
             current.push(' ');
         }
-        current += word;
+        current += &word.replace(TIE, " ");
     }
     let _ = writeln!(out, "{}", current.trim_end());
 }
@@ -140,7 +143,7 @@ fn clearance(out: &mut String, certificate: &CertificatePart) {
         let what = match &closest.obstacle {
             Some(b) => {
                 let at = [0, 1, 2].map(|i| format!("{:.2}", 0.5 * (b.min[i] + b.max[i])));
-                format!("the cell at ({})", at.join(", "))
+                format!("the cell at ({})", at.join(&format!(",{TIE}")))
             }
             None => "unseen space".to_string(),
         };

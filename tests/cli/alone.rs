@@ -47,6 +47,23 @@ fn a_map_elsewhere_is_found_when_it_is_said_where() {
 }
 
 #[test]
+fn a_csv_file_and_a_mission_of_ones_own_take_another_map_as_it_is() {
+    let sandbox = Sandbox::compiled();
+    std::fs::rename(sandbox.path("maps/first.csv"), sandbox.path("floor.csv")).expect("rename");
+    let args = |file: &'static str| ["check", file, "--mission", "missions/a.yaml", "--map", "floor.csv"];
+    for file in ["out/a/commands.csv", "out/a/commands.mcap"] {
+        sandbox.run(&["check", file]).expect(2);
+        let run = sandbox.run(&args(file)).expect(0);
+        assert!(!run.stdout.contains("note"), "the same bytes: {}", run.stdout);
+    }
+    sandbox.write("floor.csv", sandbox.text("floor.csv") + "0.125,0.125,0.000\n");
+    for file in ["out/a/commands.csv", "out/a/commands.mcap"] {
+        assert!(sandbox.run(&args(file)).expect(0).stdout.contains("  note  "));
+    }
+    sandbox.run(&["check", "out/a/commands.csv", "--map", "floor.csv"]).expect(0);
+}
+
+#[test]
 fn another_map_is_not_taken_for_the_one_planned_on() {
     let alone = only_the_file(&Sandbox::compiled(), Some("maps/first.csv"));
     alone.write("here/first.csv", alone.text("here/first.csv") + "0.125,0.125,0.000\n");

@@ -11,12 +11,14 @@ fn every_kind_of_file_can_be_inspected() {
         sandbox.ship(file);
     }
     sandbox.ship("maps/barn_29.pcd");
+    sandbox.ship("maps/site.ply");
     for (name, file) in [
         ("urdf", "robots/conv/conv.urdf"),
         ("robot", "robots/scr_db/robot.yaml"),
         ("mission", "missions/a.yaml"),
         ("csv_points", "maps/first.csv"),
         ("pcd", "maps/barn_29.pcd"),
+        ("ply", "maps/site.ply"),
         ("map_server", "maps/depot.yaml"),
         ("npy", "maps/levine_voxels.npy"),
         ("commands_csv", "out/a/commands.csv"),
