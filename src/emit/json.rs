@@ -10,8 +10,9 @@ pub fn write(table: &CommandTable) -> String {
     let keys: Vec<String> =
         csv::columns(table).iter().map(|c| serde_json::to_string(c).expect("text is plain JSON")).collect();
     let object = |k: usize| {
+        let cells = csv::cells(table.time(k), &table.rows[k], table.twist(k));
         let pairs: Vec<String> =
-            keys.iter().zip(csv::cells(table, k)).map(|(key, value)| format!("{key}: {}", number(value))).collect();
+            keys.iter().zip(cells).map(|(key, value)| format!("{key}: {}", number(value))).collect();
         format!("  {{{}}}", pairs.join(", "))
     };
     let rows: Vec<String> = (0..table.rows.len()).map(object).collect();
@@ -35,7 +36,8 @@ mod tests {
         let text = write(&table);
         for (k, line) in text.lines().skip(1).take(20).enumerate() {
             let values = line.split(": ").skip(1).map(|rest| rest.split([',', '}']).next().unwrap_or_default());
-            assert_eq!(values.map(|v| v.parse().expect("a number")).collect::<Vec<f64>>(), csv::cells(&table, k));
+            let cells = csv::cells(table.time(k), &table.rows[k], table.twist(k));
+            assert_eq!(values.map(|v| v.parse().expect("a number")).collect::<Vec<f64>>(), cells);
         }
     }
 
