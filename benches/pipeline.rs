@@ -9,10 +9,10 @@ use std::time::Duration;
 
 use criterion::{Criterion, SamplingMode, criterion_group, criterion_main};
 use trajc::certify::{self, Certificate, Goal, Task};
-use trajc::cli::inputs;
 use trajc::command::{self, CommandTable, SampleOptions};
 use trajc::esdf::{self, Esdf};
 use trajc::geom::Pose2;
+use trajc::inputs;
 use trajc::map::VoxelMap;
 use trajc::mission::{Mission, PoseSpec};
 use trajc::optimize::{self, OptimizeOptions};

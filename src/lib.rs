@@ -19,8 +19,9 @@
 //! | [`report`] | [`report::Report`] | the nouns above |
 //! | [`emit`] | bytes | `CommandTable`, `Report` |
 //!
-//! Above all stages are [`math`], [`geom`] and [`diag`]; below them [`pipeline`], [`eval`] (suites of scenes) and [`cli`]. Only `cli` opens files: stages take
-//! text and bytes, so a mission can be compiled from memory.
+//! Above all stages are [`math`], [`geom`] and [`diag`]; below them [`pipeline`], [`inputs`] (reads missions and command files with
+//! all that they name), [`eval`] (suites of scenes) and [`cli`]. Only `inputs` and `cli` open files: stages take text and bytes, so
+//! a mission can be compiled from memory.
 //!
 //! # Example
 //! A box of 0.4 m drives 2 m across a floor, around a post of 0.2 m in its way.
@@ -114,6 +115,7 @@ pub mod emit;
 pub mod esdf;
 pub mod eval;
 pub mod geom;
+pub mod inputs;
 pub mod map;
 pub mod math;
 pub mod mission;

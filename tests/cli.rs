@@ -3,6 +3,8 @@
 //! Messages are golden (`tests/golden/cli_*.snap`). After an intended change run with `INSTA_UPDATE=always` and read every
 //! text that moved.
 
+#[path = "cli/alone.rs"]
+mod alone;
 #[path = "cli/bad_input.rs"]
 mod bad_input;
 #[path = "cli/bad_maps_and_robots.rs"]

@@ -3,10 +3,10 @@
 
 use proptest::prelude::*;
 use trajc::certify::{END_ANGLE_TOLERANCE, END_POINT_TOLERANCE};
-use trajc::cli::inputs;
 use trajc::command::CommandTable;
 use trajc::emit::csv::{self, CsvHeader};
 use trajc::geom::{Pose2, wrap_angle};
+use trajc::inputs;
 use trajc::pipeline::{self, CompileOptions, Outcome};
 
 /// A mission on the small shipped map.

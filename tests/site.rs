@@ -2,9 +2,9 @@
 
 use nalgebra::{Point3, Vector3};
 use trajc::certify::{Certificate, Goal, RefusalKind, Task, certify};
-use trajc::cli::inputs;
 use trajc::command::{CommandRow, CommandTable};
 use trajc::geom::Pose2;
+use trajc::inputs;
 use trajc::mission::Sampling;
 use trajc::pipeline::{self, CompileOptions, World};
 use trajc::robot::RobotModel;

@@ -2,19 +2,20 @@
 
 use std::path::{Path, PathBuf};
 
-use super::inputs::{self, Disk};
+use super::inputs::{self, Disk, Named};
 use super::output::{self, depfile, spelled};
 use super::terminal::Terminal;
 use crate::diag::{Diagnostic, Diagnostics, Severity};
 use crate::emit::csv::{self, CsvHeader};
+use crate::emit::json;
 use crate::emit::mcap::{self, McapInputs};
 use crate::pipeline::{self, CompileOptions, Compiled, Inputs, Outcome};
 use crate::report::{PathErrorRow, summary};
 
 /// Compile one mission into certified command files.
 ///
-/// Writes commands.csv, commands.mcap, path_error.csv, report.json, commands.d and timings.json into DIR/<mission's name>/, all or
-/// none, and prints a summary.
+/// Writes commands.csv, commands.mcap, path_error.csv, report.json, commands.d and timings.json into DIR/<mission's name>/ (--format
+/// chooses the command files), all or none, and prints a summary.
 ///
 /// Exit 0: certified. 1: no trajectory or no certificate; report.json says why. 2: bad input or usage. After 1 and 2 no command file
 /// of this mission is left, not even an older one.
@@ -44,6 +45,20 @@ enum Format {
     Csv,
     /// commands.mcap, for ROS 2 and Foxglove
     Mcap,
+    /// trajectory.json, an array with an object for each row of commands.csv; names no mission, so it cannot be checked
+    #[value(name = "trajectory.json")]
+    Trajectory,
+}
+
+impl Format {
+    /// The file that it is.
+    fn file(self) -> &'static str {
+        match self {
+            Self::Csv => "commands.csv",
+            Self::Mcap => "commands.mcap",
+            Self::Trajectory => "trajectory.json",
+        }
+    }
 }
 
 /// A sampling time on the command line.
@@ -106,6 +121,7 @@ fn run(args: &CompileArgs, name: &str, terminal: &mut Terminal) -> Result<u8, Di
             report: &outcome.report,
             folder: &folder,
             files: &files,
+            colour: terminal.colour_results,
         })
     };
     terminal.print(&text);
@@ -161,7 +177,7 @@ fn command_files(
     };
     let mut files: Vec<(&'static str, Vec<u8>)> = Vec::new();
     if args.format.contains(&Format::Csv) {
-        files.push(("commands.csv", csv::write(&compiled.commands, &header).into_bytes()));
+        files.push((Format::Csv.file(), csv::write(&compiled.commands, &header).into_bytes()));
     }
     if args.format.contains(&Format::Mcap) {
         let bytes = mcap::write(&McapInputs {
@@ -172,15 +188,27 @@ fn command_files(
             robot_yaml: inputs.robot_yaml.as_ref().map(|f| f.text.as_str()),
             urdf: &inputs.urdf.text,
             report,
-            meshes: &disk.meshes(),
+            path_csv: inputs.path_csv.as_ref().map(|f| f.text.as_str()),
+            meshes: &meshes(inputs, disk, &start),
         })?;
-        files.push(("commands.mcap", bytes));
+        files.push((Format::Mcap.file(), bytes));
     }
+    if args.format.contains(&Format::Trajectory) {
+        files.push((Format::Trajectory.file(), json::write(&compiled.commands).into_bytes()));
+    }
+    // One target, the first: build systems want no outputs named that they were not told of.
+    let target = files.first().map_or(Format::Csv.file(), |(name, _)| name);
     files.push(("path_error.csv", csv::write_path_error(path_error).into_bytes()));
-    let target = if args.format.contains(&Format::Csv) { "commands.csv" } else { "commands.mcap" };
     let read: Vec<PathBuf> = disk.paths().iter().map(|p| spelled(p, &start)).collect();
     files.push(("commands.d", depfile(&spelled(&folder.join(target), &start), &read).into_bytes()));
     Ok(files)
+}
+
+/// Meshes by their paths from the URDF's folder.
+fn meshes(inputs: &Inputs, disk: &Disk, start: &Path) -> Vec<Named> {
+    let folder = start.join(inputs::folder_of(Path::new(&inputs.urdf.name)));
+    let name = |path: &str| from_folder(&folder, &start.join(path));
+    disk.meshes().into_iter().map(|(path, bytes)| (name(&path), bytes)).collect()
 }
 
 /// The path that leads from a folder to a file, both absolute; with `..` where needed.

@@ -1,8 +1,11 @@
 //! `trajc inspect FILE`.
 
+mod commands;
+
 use std::path::{Path, PathBuf};
 
-use super::check::{mission_of, read_commands};
+use serde_json::{Value, json};
+
 use super::inputs::{self, Disk, read_map_file, read_robot_files};
 use super::plot;
 use super::terminal::Terminal;
@@ -10,11 +13,13 @@ use crate::diag::{Diagnostic, Diagnostics};
 use crate::map::{self, MapInputs};
 use crate::mission::{LimitsSpec, MapSpec, Unknown};
 use crate::pipeline;
-use crate::report::metrics;
 use crate::report::plot::Figure;
+use crate::report::schema::{MapPart, RobotPart};
 use crate::robot::{self, RobotInputs};
 
 /// Print what the program understood of a URDF, robot.yaml, map, mission or command file.
+///
+/// Of a command file: its rows, peaks against the limits, and of .mcap topics, attachments and the certificate as recorded.
 #[derive(Debug, clap::Args)]
 pub struct InspectArgs {
     /// .urdf, robot.yaml, a mission, a map, commands.csv or commands.mcap.
@@ -25,13 +30,20 @@ pub struct InspectArgs {
     /// Slab of a map that holds obstacles, in metres.
     #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', allow_hyphen_values = true, default_values_t = [0.02, 2.0])]
     height: Vec<f64>,
+    /// Print it as JSON.
+    #[arg(long)]
+    json: bool,
     /// Draw it too: from above; of commands, wheels and joints over time.
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
 }
 
 /// What is printed, and what is drawn.
-type Understood = (String, Figure);
+struct Understood {
+    text: String,
+    json: Value,
+    figure: Figure,
+}
 
 /// What a .yaml is, by its keys.
 enum YamlKind {
@@ -47,10 +59,10 @@ enum YamlKind {
 pub fn inspect(args: &InspectArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics> {
     let path = args.file.as_path();
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    let (text, figure) = match ending.as_str() {
+    let understood = match ending.as_str() {
         "urdf" => of_robot(path)?,
-        "mcap" => of_commands(path)?,
-        "csv" if starts_as_commands(path)? => of_commands(path)?,
+        "mcap" => commands::describe(path)?,
+        "csv" if starts_as_commands(path)? => commands::describe(path)?,
         "yaml" | "yml" => match kind_of_yaml(path)? {
             YamlKind::Mission => of_mission(path)?,
             YamlKind::Robot => of_robot(path)?,
@@ -59,9 +71,9 @@ pub fn inspect(args: &InspectArgs, terminal: &mut Terminal) -> Result<u8, Diagno
         _ => of_map(args, path)?,
     };
     if let Some(path) = &args.plot {
-        super::output::write_file(path, figure.to_svg().as_bytes())?;
+        super::output::write_file(path, understood.figure.to_svg().as_bytes())?;
     }
-    terminal.print(&text);
+    terminal.print(&if args.json { format!("{:#}\n", understood.json) } else { understood.text });
     Ok(0)
 }
 
@@ -95,7 +107,8 @@ fn of_robot(path: &Path) -> Result<Understood, Diagnostics> {
         files: &mut files,
         overrides: &overrides,
     })?;
-    Ok((robot.describe(), plot::robot(&robot)))
+    let json = json!(RobotPart::from(&robot));
+    Ok(Understood { text: robot.describe(), json, figure: plot::robot(&robot) })
 }
 
 fn of_map(args: &InspectArgs, path: &Path) -> Result<Understood, Diagnostics> {
@@ -120,7 +133,8 @@ fn of_map(args: &InspectArgs, path: &Path) -> Result<Understood, Diagnostics> {
     };
     let beside = file.beside.as_ref().map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
     let map = map::parse(&MapInputs { name: &file.name, bytes: &file.bytes, beside }, &spec, height[1])?;
-    Ok((map.describe(), plot::map(&file.name, &map)))
+    let json = json!(MapPart::from(&map));
+    Ok(Understood { text: map.describe(), json, figure: plot::map(&file.name, &map) })
 }
 
 fn of_mission(path: &Path) -> Result<Understood, Diagnostics> {
@@ -149,42 +163,13 @@ fn of_mission(path: &Path) -> Result<Understood, Diagnostics> {
         out += "\n";
         out += &map.describe();
     }
-    let figure = plot::mission(mission, &world);
-    Ok((out, figure))
-}
-
-fn of_commands(path: &Path) -> Result<Understood, Diagnostics> {
-    let file = read_commands(path)?;
-    let table = &file.table;
-    let driven = metrics::of_commands(table);
-    let mut out = format!("commands {}\n", path.display());
-    out += &format!("  mission    {}\n  robot      {}\n", file.header.mission, file.header.robot);
-    if let Some(map) = &file.header.map {
-        out += &format!("  map        {map}\n");
-    }
-    out += &format!("  inputs     blake3 {}\n", file.header.inputs_blake3);
-    out += &format!(
-        "  rows       {} of {} s, {} s in all, sampling {}\n",
-        table.rows.len(),
-        table.sampling_time,
-        table.duration(),
-        crate::report::names::sampling(table.sampling)
-    );
-    out += &format!("  wheels     radius {} m, track {} m\n", table.wheel_radius, table.track_width);
-    let joints: Vec<&str> = table.joints.iter().map(|(name, _)| name.as_str()).collect();
-    out += &format!("  joints     {}\n", if joints.is_empty() { "none".to_owned() } else { joints.join(", ") });
-    out += &format!("  drives     {:.3} m\n", driven.length_m);
-    for (name, row) in [("from", table.rows.first()), ("to", table.rows.last())] {
-        if let Some(row) = row {
-            out += &format!("  {name:<10} x {:.4} m, y {:.4} m, yaw {:.4} rad", row.pose.x, row.pose.y, row.pose.yaw);
-            for ((joint, _), value) in table.joints.iter().zip(&row.joint_positions) {
-                out += &format!(", {joint} {value:.4}");
-            }
-            out += "\n";
-        }
-    }
-    // Drawn with its mission's robot and map, where these are at hand.
-    let world = mission_of(path, &file.header, None).and_then(|(mut inputs, _)| pipeline::world(&mut inputs)).ok();
-    let figure = plot::commands(&path.display().to_string(), table, world.as_ref());
-    Ok((out, figure))
+    let json = json!({
+        "mission": mission.name,
+        "clearance_m": mission.clearance,
+        "sampling_time_s": mission.sampling_time,
+        "reads": disk.paths(),
+        "robot": RobotPart::from(&world.robot),
+        "map": world.map.as_ref().map(MapPart::from),
+    });
+    Ok(Understood { text: out, json, figure: plot::mission(mission, &world) })
 }

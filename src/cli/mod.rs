@@ -5,7 +5,6 @@ pub mod check;
 pub mod compile;
 pub mod completions;
 pub mod eval;
-pub mod inputs;
 pub mod inspect;
 pub mod output;
 pub mod path_error;
@@ -16,6 +15,7 @@ pub mod terminal;
 use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::diag::{Diagnostics, Severity};
+use crate::inputs;
 use terminal::Terminal;
 
 /// Offline trajectory compiler for differential-drive robots that change shape.

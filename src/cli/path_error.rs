@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use super::check::{mission_of, read_commands};
 use super::compile::seconds;
-use super::inputs;
+use super::inputs::{
+    self,
+    commands::{self, Places},
+};
 use super::output::write_file;
 use super::plot;
 use super::terminal::Terminal;
@@ -35,6 +37,9 @@ pub struct PathErrorArgs {
     /// Find the largest sampling time up to 0.8 s with which the commands stay within this of the path, and end within this of its end: 5mm.
     #[arg(long, value_name = "LENGTH", value_parser = length)]
     max_error: Option<f64>,
+    /// The map's file of a command file, where it is not where its mission says.
+    #[arg(long, value_name = "FILE")]
+    map: Option<PathBuf>,
     /// Draw the errors against the sampling time.
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
@@ -62,10 +67,15 @@ pub fn path_error(args: &PathErrorArgs, terminal: &mut Terminal) -> Result<u8, D
         let (mut inputs, _) = inputs::read(&args.file)?;
         of_mission(args, &mut inputs, terminal)?
     } else {
-        let file = read_commands(&args.file)?;
-        let (mut inputs, _) = mission_of(&args.file, &file.header, None)?;
-        let own = pipeline::path_error_of_commands(&mut inputs, &file.table)?;
         let asked = !args.sampling_times.is_empty() || !args.sampling.is_empty() || args.max_error.is_some();
+        let file = commands::read(&args.file)?;
+        if !file.contradictions.is_empty() {
+            return Err(Diagnostics(file.contradictions));
+        }
+        let places = Places { mission: None, map: args.map.as_deref() };
+        let loaded = if asked { file.load(places)? } else { file.load_without_map(places)? };
+        let own = pipeline::path_error_of_commands(&loaded.inputs, &loaded.world, &loaded.file.table)?;
+        let mut inputs = loaded.inputs;
         let mut measured = if asked { of_mission(args, &mut inputs, terminal)? } else { Measured::default() };
         measured.rows.insert(0, own);
         measured

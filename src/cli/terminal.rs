@@ -8,7 +8,10 @@ use crate::diag::{Diagnostics, render};
 
 /// The user's terminal, or the pipe in its place.
 pub struct Terminal {
+    /// Diagnostics are coloured.
     colour: bool,
+    /// Results are.
+    pub colour_results: bool,
     /// Asked for no progress (`--quiet`).
     pub quiet: bool,
 }
@@ -17,7 +20,11 @@ impl Terminal {
     /// Colour only on a terminal, and never where `NO_COLOR` is set.
     pub fn new() -> Self {
         let wanted = std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty());
-        Self { colour: wanted && std::io::stderr().is_terminal(), quiet: false }
+        Self {
+            colour: wanted && std::io::stderr().is_terminal(),
+            colour_results: wanted && std::io::stdout().is_terminal(),
+            quiet: false,
+        }
     }
 
     /// A result. A reader that has gone away is no error of ours.

@@ -49,7 +49,9 @@ pub mod attached {
     pub const URDF: &str = "robot.urdf";
     /// report.json.
     pub const REPORT: &str = "report.json";
-    /// Prefix of meshes; the rest is the name by which the URDF's reader asks for the file.
+    /// The file of a given path; not there where the mission names none.
+    pub const PATH: &str = "path.csv";
+    /// Prefix of meshes; the rest is the path to the file from the URDF's folder.
     pub const MESHES: &str = "meshes/";
 }
 
@@ -70,7 +72,9 @@ pub struct McapInputs<'a> {
     pub urdf: &'a str,
     /// Text of report.json.
     pub report: &'a str,
-    /// Meshes: name by which the URDF's reader asked for each, and bytes. Names differ.
+    /// Text of the given path's file, where the mission names one.
+    pub path_csv: Option<&'a str>,
+    /// Meshes: path from the URDF's folder, and bytes. Paths differ.
     pub meshes: &'a [(String, Vec<u8>)],
 }
 
@@ -151,6 +155,7 @@ impl File {
         files.extend(inputs.robot_yaml.map(|text| (attached::ROBOT.to_string(), "application/yaml", text.as_bytes())));
         files.push((attached::URDF.to_string(), "application/xml", inputs.urdf.as_bytes()));
         files.push((attached::REPORT.to_string(), "application/json", inputs.report.as_bytes()));
+        files.extend(inputs.path_csv.map(|text| (attached::PATH.to_string(), "text/csv", text.as_bytes())));
         for (name, bytes) in inputs.meshes {
             let kind = if name.to_ascii_lowercase().ends_with(".obj") { "model/obj" } else { "model/stl" };
             files.push((format!("{}{name}", attached::MESHES), kind, bytes));

@@ -32,6 +32,19 @@ pub struct CommandFile {
     pub header: CsvHeader,
     /// In the file's order.
     pub attachments: Vec<Attached>,
+    /// In the order of their channels.
+    pub topics: Vec<Topic>,
+}
+
+/// A topic and how much of it there is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Topic {
+    /// Its name.
+    pub name: String,
+    /// The type of its messages: `package/msg/Type`.
+    pub kind: String,
+    /// How many there are.
+    pub messages: usize,
 }
 
 /// A file attached to an MCAP file; for the names see [`super::mcap::attached`].
@@ -213,7 +226,8 @@ fn parse(bytes: &[u8]) -> Result<CommandFile, McapReadError> {
     check_schedule(&contents, &table)?;
     check_twists(&contents, &table)?;
     check_trajectory(&contents, &table)?;
-    Ok(CommandFile { table, header, attachments: contents.attachments })
+    let topics = contents.topics();
+    Ok(CommandFile { table, header, attachments: contents.attachments, topics })
 }
 
 // ---- the head

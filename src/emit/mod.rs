@@ -3,6 +3,7 @@
 pub mod cdr;
 pub mod csv;
 mod csv_read;
+pub mod json;
 pub mod mcap;
 pub mod mcap_read;
 mod ros;

@@ -1,6 +1,6 @@
 //! Command files that are there already: judged, measured.
 
-use super::{Inputs, World, end_of, given_path, goal, start_of, world};
+use super::{Inputs, World, end_of, given_path, goal, start_of};
 use crate::certify::{self, Certificate, Task};
 use crate::command::CommandTable;
 use crate::diag::{Diagnostic, Diagnostics};
@@ -11,10 +11,12 @@ use crate::trajectory::Trajectory;
 
 /// Judges commands that this program did not plan, against a mission's robot, map, limits, start and goal.
 ///
+/// `world` is what [`super::world`] made of `inputs`.
+///
 /// # Errors
-/// Bad inputs; joints of the table that are not the robot's.
-pub fn check(inputs: &mut Inputs, table: &CommandTable) -> Result<Certificate, Diagnostics> {
-    let World { robot, map } = world(inputs)?;
+/// Joints of the table that are not the robot's; no rows; a given path that is none.
+pub fn check(inputs: &Inputs, world: &World, table: &CommandTable) -> Result<Certificate, Diagnostics> {
+    let World { robot, map } = world;
     let mission = &inputs.mission;
     let expected: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
     let found: Vec<&str> = table.joints.iter().map(|(name, _)| name.as_str()).collect();
@@ -27,7 +29,7 @@ pub fn check(inputs: &mut Inputs, table: &CommandTable) -> Result<Certificate, D
         return Err(Diagnostic::error("check/empty", "the command file has no row").into());
     };
     let given = match &mission.path {
-        Some(path) => Some(given_path(mission, path, inputs.path_csv.as_ref(), &robot)?),
+        Some(path) => Some(given_path(mission, path, inputs.path_csv.as_ref(), robot)?),
         None => None,
     };
     let asked = mission.start.as_ref();
@@ -42,31 +44,32 @@ pub fn check(inputs: &mut Inputs, table: &CommandTable) -> Result<Certificate, D
     let start_joints = robot.joints.iter().zip(&first.joint_positions);
     let start_joints =
         start_joints.map(|(j, own)| asked.and_then(|p| p.joints.get(&j.name).copied()).unwrap_or(*own)).collect();
-    let goal = goal(mission, &robot, given.as_ref().map(end_of));
+    let goal = goal(mission, robot, given.as_ref().map(end_of));
     let task = Task { start, start_joints, goal, clearance: mission.clearance, reverse: mission.reverse };
-    Ok(certify::certify(table, &robot, map.as_ref(), &task))
+    Ok(certify::certify(table, robot, map.as_ref(), &task))
 }
 
 /// The path error of commands as they are written: their replay against the mission's given path, or, where the path was
 /// planned, against the table's own planned poses.
 ///
 /// # Errors
-/// Bad inputs.
+/// No rows; a given path that is none.
 pub fn path_error_of_commands(
-    inputs: &mut Inputs,
+    inputs: &Inputs,
+    world: &World,
     table: &CommandTable,
 ) -> Result<crate::report::PathErrorRow, Diagnostics> {
-    let World { robot, .. } = world(inputs)?;
+    let robot = &world.robot;
     let mission = &inputs.mission;
     let Some(first) = table.rows.first() else {
         return Err(Diagnostic::error("check/empty", "the command file has no row").into());
     };
     let trajectory = match &mission.path {
-        Some(path) => given_path(mission, path, inputs.path_csv.as_ref(), &robot)?,
+        Some(path) => given_path(mission, path, inputs.path_csv.as_ref(), robot)?,
         None => planned_poses(table),
     };
     let options = RetimeOptions { law: crate::mission::TimeLaw::Auto, sampling_time: table.sampling_time };
-    let reference = path_error::PathReference::new(&retime::retime(&trajectory, &robot, &options)?);
+    let reference = path_error::PathReference::new(&retime::retime(&trajectory, robot, &options)?);
     let (start, _) = start_of(&trajectory);
     let start = if mission.path.is_some() { start } else { first.pose };
     Ok((&path_error::path_error_of_table(table, start, &reference)).into())

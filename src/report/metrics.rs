@@ -5,7 +5,7 @@
 //! acceleration. Jerk of several joints is the Euclidean norm over them (rad/s^3; prismatic joints in m/s^3).
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::command::CommandTable;
 use crate::math::poly::Piece;
@@ -14,7 +14,7 @@ use crate::search::{SearchMove, SearchPath, SearchState};
 use crate::trajectory::{Leg, StillLeg, Trajectory};
 
 /// Length, duration and smoothness of a motion.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Metrics {
     /// Distance driven, m.
     pub length_m: f64,

@@ -12,11 +12,11 @@ pub use metrics::Metrics;
 pub use schema::{Report, Status, json_schema};
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Path error of the commands that one sampling time gives: a row of `path_error.csv` and of `report.json`'s `path_error`.
 /// Measured on the replay of held commands against the exact path.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PathErrorRow {
     /// Seconds a command is held.
     pub sampling_time_s: f64,

@@ -2,7 +2,7 @@
 //! absent; no number is ever NaN or infinite.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{Metrics, PathErrorRow};
 
@@ -10,7 +10,7 @@ use super::{Metrics, PathErrorRow};
 pub const SCHEMA: &str = "trajc.report/1";
 
 /// Everything known about one run of a mission. Starts as `failed` and is `certified` only by [`Report::judge`].
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Report {
     /// Always `trajc.report/1`.
     pub schema: String,
@@ -40,7 +40,7 @@ pub struct Report {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub profile: Option<ProfilePart>,
     /// Peaks of every actuator as written, against its limits.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub limits: Vec<LimitPart>,
     /// The command table.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -49,12 +49,12 @@ pub struct Report {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub certificate: Option<CertificatePart>,
     /// Path error by sampling time.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub path_error: Vec<PathErrorRow>,
 }
 
 /// The verdict on a mission.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
     /// Command files are written and proven.
@@ -64,7 +64,7 @@ pub enum Status {
 }
 
 /// Why a run failed.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Failure {
     /// The stage that failed: `mission`, `robot`, `map`, `search`, `retime`, `certify`, …
     pub stage: String,
@@ -78,7 +78,7 @@ pub struct Failure {
 }
 
 /// The files that were read.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct InputsPart {
     /// The mission.
     pub mission: InputFile,
@@ -89,12 +89,19 @@ pub struct InputsPart {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub map: Option<InputFile>,
     /// Files that those name: URDF, meshes, images, a path.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub other: Vec<InputFile>,
 }
 
+impl InputsPart {
+    /// All of them.
+    pub fn files(&self) -> impl Iterator<Item = &InputFile> {
+        std::iter::once(&self.mission).chain(&self.robot).chain(&self.map).chain(&self.other)
+    }
+}
+
 /// A file that was read.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct InputFile {
     /// As the mission spells it.
     pub path: String,
@@ -103,7 +110,7 @@ pub struct InputFile {
 }
 
 /// The robot as understood.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobotPart {
     /// Its name.
     pub name: String,
@@ -118,7 +125,7 @@ pub struct RobotPart {
 }
 
 /// A moving joint; `null`: given nowhere. Units: rad or, when prismatic, m.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct JointPart {
     /// URDF name.
     pub name: String,
@@ -137,7 +144,7 @@ pub struct JointPart {
 }
 
 /// The map as understood.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MapPart {
     /// Cells along x, y, z.
     pub dims: [usize; 3],
@@ -158,7 +165,7 @@ pub struct MapPart {
 }
 
 /// The search.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SearchPart {
     /// States expanded.
     pub expanded: usize,
@@ -167,7 +174,7 @@ pub struct SearchPart {
 }
 
 /// The trajectory that the commands follow.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TrajectoryPart {
     /// `optimised`, `search` (the fall-back) or `given`.
     pub source: String,
@@ -188,14 +195,14 @@ pub struct TrajectoryPart {
 }
 
 /// The search's lattice path.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct InitialPart {
     /// Timed by trapezoids of speed.
     pub metrics: Metrics,
 }
 
 /// The time law.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ProfilePart {
     /// Which law timed the path (`auto` says which it took).
     pub time_law: String,
@@ -210,7 +217,7 @@ pub struct ProfilePart {
 }
 
 /// One actuator's peak against its limit; wheels in m/s at the rim, joints in rad or m.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LimitPart {
     /// `wheel_left`, `wheel_right`, or the joint's name.
     pub actuator: String,
@@ -223,7 +230,7 @@ pub struct LimitPart {
 }
 
 /// The command table.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CommandsPart {
     /// Rows, the last one at rest.
     pub rows: usize,
@@ -236,7 +243,7 @@ pub struct CommandsPart {
 }
 
 /// What was proven.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CertificatePart {
     /// m; absent without a map.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -260,7 +267,7 @@ pub struct CertificatePart {
 pub const FAR: f64 = 1e6;
 
 /// The closest approach found.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ClosestPart {
     /// s.
     pub time_s: f64,
@@ -274,7 +281,7 @@ pub struct ClosestPart {
 }
 
 /// An axis-aligned box, m.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BoxPart {
     /// Lower corner.
     pub min: [f64; 3],

@@ -1,10 +1,12 @@
 //! What `trajc compile` prints for a person: one screen with the verdict, the figures it rests on and what to do next.
 
-use std::f64::consts::PI;
+mod limits;
+
 use std::fmt::Write;
 
 use super::schema::{CertificatePart, LimitPart, Report, Status};
 use crate::certify::{END_ANGLE_TOLERANCE, END_POINT_TOLERANCE};
+pub use limits::table as limits_table;
 
 /// What a summary says beside the report.
 #[derive(Debug, Clone, Copy)]
@@ -17,12 +19,14 @@ pub struct SummaryInputs<'a> {
     pub folder: &'a str,
     /// Names of the files written there, in the order to list them.
     pub files: &'a [&'a str],
+    /// The verdict is coloured.
+    pub colour: bool,
 }
 
-/// Actuators listed; more are counted.
-const ACTUATORS: usize = 8;
-/// Lines are broken before this column.
-const WIDTH: usize = 100;
+/// Lines are broken before this column: what every terminal has.
+const WIDTH: usize = 80;
+/// Lengths and angles below this, in the unit that they are shown in, are told as below it.
+const LEAST: f64 = 1e-3;
 
 /// The text, ends in a newline. Values are rounded for reading; report.json has all digits.
 pub fn render(inputs: &SummaryInputs<'_>) -> String {
@@ -38,47 +42,59 @@ fn counted(count: usize, what: &str) -> String {
 
 fn certified(inputs: &SummaryInputs<'_>) -> String {
     let report = inputs.report;
-    let mut out = format!("{}: CERTIFIED\n\n", inputs.mission);
+    let mut out = format!("{}: {}\n\n", inputs.mission, paint("CERTIFIED", 32, inputs.colour));
     motion(&mut out, report);
     if let Some(certificate) = &report.certificate {
-        clearance(&mut out, certificate);
-        goal(&mut out, certificate);
+        proof(&mut out, certificate, &report.limits, &prismatic(report));
     }
-    limits(&mut out, report);
     path_error(&mut out, report);
     files(&mut out, inputs);
-    out += "\nProven over the model of robot and map; wheel slip and tracking errors are not in it.\n";
+    out += "\nProven of the model; wheel slip and tracking errors are not in it.\n";
     if let Some(file) = inputs.files.iter().find(|f| f.starts_with("commands.") && !f.ends_with(".d")) {
         let _ = writeln!(out, "Next: trajc check {}", shell(&join(inputs.folder, file)));
     }
     out
 }
 
+/// What was reached. Why it failed is the diagnostic's to say, which follows on stderr, and report.json's.
 fn failed(inputs: &SummaryInputs<'_>) -> String {
     let report = inputs.report;
     let stage = report.failure.as_ref().map_or("unknown", |f| f.stage.as_str());
-    let mut out = format!("{}: FAILED in {stage}; no command file\n\n", inputs.mission);
-    if let Some(failure) = &report.failure {
-        for (i, reason) in failure.reason.split("; ").enumerate() {
-            line(&mut out, if i == 0 { "reason" } else { "" }, reason);
-        }
-        for (key, value) in &failure.numbers {
-            if let serde_json::Value::Number(number) = value {
-                line(&mut out, "", &format!("{key} = {number}"));
-            }
-        }
-    }
+    let verdict = paint("FAILED", 31, inputs.colour);
+    let mut out = format!("{}: {verdict} in {stage}; no command file\n\n", inputs.mission);
     motion(&mut out, report);
     if let Some(certificate) = &report.certificate {
         clearance(&mut out, certificate);
-        limits(&mut out, report);
+        limits(&mut out, &report.limits, &prismatic(report));
     }
     files(&mut out, inputs);
+    // The diagnostic follows.
+    out.push('\n');
     out
 }
 
+/// Lines that tell what a certificate says. `prismatic`: which joints are measured in metres.
+pub fn proof(out: &mut String, certificate: &CertificatePart, peaks: &[LimitPart], prismatic: &dyn Fn(&str) -> bool) {
+    clearance(out, certificate);
+    goal(out, certificate);
+    limits(out, peaks, prismatic);
+}
+
+fn prismatic(report: &Report) -> impl Fn(&str) -> bool {
+    let joints = report.robot.as_ref().map_or(&[][..], |r| &r.joints);
+    move |name| joints.iter().any(|j| j.name == name && j.prismatic)
+}
+
+/// Bold and in one of the terminal's eight colours.
+fn paint(word: &str, colour: u8, wanted: bool) -> String {
+    if wanted { format!("\x1b[1;{colour}m{word}\x1b[0m") } else { word.to_owned() }
+}
+
+/// Holds words together where a line is broken.
+const TIE: &str = "\u{a0}";
+
 /// One labelled line, broken at spaces.
-fn line(out: &mut String, label: &str, text: &str) {
+pub fn line(out: &mut String, label: &str, text: &str) {
     let mut current = format!("  {label:<12}");
     let indent = current.len();
     for word in text.split(' ') {
@@ -89,27 +105,20 @@ fn line(out: &mut String, label: &str, text: &str) {
         if current.len() > indent {
             current.push(' ');
         }
-        current += word;
+        current += &word.replace(TIE, " ");
     }
     let _ = writeln!(out, "{}", current.trim_end());
 }
 
 fn motion(out: &mut String, report: &Report) {
-    let mut parts = Vec::new();
+    let length = report.trajectory.as_ref().and_then(|t| t.metrics).map(|m| figure(m.length_m));
+    let law = report.profile.as_ref().map(|profile| profile.time_law.as_str());
     if let Some(commands) = &report.commands {
-        parts.push(format!(
-            "{} s in {} rows of {} s ({})",
-            figure(commands.duration_s),
-            commands.rows,
-            commands.sampling_time_s,
-            commands.sampling
-        ));
-    }
-    if let Some(metrics) = report.trajectory.as_ref().and_then(|t| t.metrics) {
-        parts.insert(0, format!("{} m", figure(metrics.length_m)));
-    }
-    if !parts.is_empty() {
-        line(out, "motion", &parts.join(", "));
+        let length = length.map_or(String::new(), |length| format!("{length} m in "));
+        let law = law.map_or(String::new(), |law| format!(", time law {law}"));
+        line(out, "motion", &format!("{length}{} s{law}", figure(commands.duration_s)));
+        let (rows, held) = (counted(commands.rows, "row"), commands.sampling_time_s);
+        line(out, "commands", &format!("{rows} of {held} s, sampling {}", commands.sampling));
     }
     let mut parts = Vec::new();
     if let Some(trajectory) = &report.trajectory {
@@ -123,97 +132,65 @@ fn motion(out: &mut String, report: &Report) {
             parts.push(format!("{iterations} iterations, {}", ending.replace('_', " ")));
         }
     }
-    if let Some(profile) = &report.profile {
-        parts.push(format!("time law {}", profile.time_law));
-    }
     if !parts.is_empty() {
         line(out, "path", &parts.join(", "));
     }
 }
 
 fn clearance(out: &mut String, certificate: &CertificatePart) {
-    let Some(required) = certificate.clearance_required_m else {
-        line(out, "clearance", "no map: not checked");
-        return;
-    };
-    let proven = match certificate.clearance_proven_m {
-        Some(proven) if proven >= super::schema::FAR => "no obstacle anywhere".to_string(),
-        Some(proven) => {
-            let margin = match proven - required {
-                short if short < 0.0 => format!("{} m short", figure(-short)),
-                margin => format!("{} m to spare", figure(margin)),
-            };
-            format!("{} m proven, {required} m required: {margin}", figure(proven))
-        }
-        None => format!("nothing proven, {required} m required"),
-    };
-    line(out, "clearance", &proven);
+    line(out, "clearance", &clearance_text(certificate));
     if let Some(closest) = &certificate.closest {
         let what = match &closest.obstacle {
             Some(b) => {
                 let at = [0, 1, 2].map(|i| format!("{:.2}", 0.5 * (b.min[i] + b.max[i])));
-                format!("the obstacle at ({}) m", at.join(", "))
+                format!("the cell at ({})", at.join(&format!(",{TIE}")))
             }
             None => "unseen space".to_string(),
         };
-        let (distance, link) = (figure(closest.distance_m), &closest.link);
-        line(out, "", &format!("closest at {} s: {link} is {distance} m from {what}", figure(closest.time_s)));
+        line(out, "", &format!("closest at {} s: {} to {what}", figure(closest.time_s), closest.link));
+    }
+}
+
+/// What of the clearance is proven, in words.
+pub fn clearance_text(certificate: &CertificatePart) -> String {
+    let Some(required) = certificate.clearance_required_m else { return "no map: not checked".to_owned() };
+    match certificate.clearance_proven_m {
+        Some(proven) if proven >= super::schema::FAR => "no obstacle anywhere".to_string(),
+        Some(proven) => {
+            let margin = match proven - required {
+                short if short < 0.0 => format!("{} short", length(-short)),
+                margin => format!("{} to spare", length(margin)),
+            };
+            format!("{} proven, {} required: {margin}", length(proven), length(required))
+        }
+        None => format!("nothing proven, {} required", length(required)),
     }
 }
 
 fn goal(out: &mut String, certificate: &CertificatePart) {
-    let Some(point) = certificate.end_point_error_m else { return };
-    let degrees = |rad: f64| figure(rad * 180.0 / PI);
-    let (mut missed, mut allowed) = (figure(1e3 * point) + " mm", figure(1e3 * END_POINT_TOLERANCE) + " mm");
+    if let Some(text) = goal_text(certificate) {
+        line(out, "goal", &text);
+    }
+}
+
+/// How far from the goal the motion ends, in words.
+pub fn goal_text(certificate: &CertificatePart) -> Option<String> {
+    let (mut missed, mut allowed) = (length(certificate.end_point_error_m?), length(END_POINT_TOLERANCE));
     if let Some(heading) = certificate.end_heading_error_rad {
-        missed += &format!(" and {}°", degrees(heading));
-        allowed += &format!(" and {}°", degrees(END_ANGLE_TOLERANCE));
+        missed += &format!(" and {}", degrees(heading));
+        allowed += &format!(" and {}", degrees(END_ANGLE_TOLERANCE));
     }
-    line(out, "goal", &format!("reached within {missed}; {allowed} are allowed"));
+    Some(format!("missed by {missed}; allowed: {allowed}"))
 }
 
-fn limits(out: &mut String, report: &Report) {
-    let mut actuators: Vec<&str> = Vec::new();
-    for row in &report.limits {
-        if !actuators.contains(&row.actuator.as_str()) {
-            actuators.push(&row.actuator);
-        }
+fn limits(out: &mut String, peaks: &[LimitPart], prismatic: &dyn Fn(&str) -> bool) {
+    let table = limits_table(peaks, prismatic);
+    if table.is_empty() {
+        return;
     }
-    let prismatic = |name: &str| {
-        let joints = report.robot.as_ref().map_or(&[][..], |r| &r.joints);
-        name == "wheel_left" || name == "wheel_right" || joints.iter().any(|j| j.name == name && j.prismatic)
-    };
-    let width = actuators.iter().take(ACTUATORS).map(|a| a.chars().count()).max().unwrap_or(0);
-    for (i, actuator) in actuators.iter().take(ACTUATORS).enumerate() {
-        let unit = if prismatic(actuator) { "m" } else { "rad" };
-        let cells: Vec<String> = ["speed", "acceleration", "jerk"]
-            .iter()
-            .zip(["/s", "/s²", "/s³"])
-            .filter_map(|(quantity, per)| {
-                let row = report.limits.iter().find(|r| r.actuator == *actuator && r.quantity == *quantity)?;
-                Some(limit(row, &format!("{unit}{per}")))
-            })
-            .collect();
-        let label = if i == 0 { "limits" } else { "" };
-        let cells: Vec<String> = cells.iter().map(|c| format!("{c:<30}")).collect();
-        let _ = writeln!(out, "{}", format!("  {label:<12}{actuator:<width$}  {}", cells.join("")).trim_end());
-    }
-    if actuators.len() > ACTUATORS {
-        line(out, "", &format!("and {} more in report.json", actuators.len() - ACTUATORS));
-    }
-}
-
-/// Peak, limit, and what is left of the limit.
-fn limit(row: &LimitPart, unit: &str) -> String {
-    let peak = row.peak.map_or("?".to_string(), figure);
-    match (row.peak, row.limit) {
-        (Some(value), Some(limit)) if limit > 0.0 && value <= limit * (1.0 + 1e-9) => {
-            // Rounded down, so that «0 % left» is never shown as more.
-            let left = (100.0 * (1.0 - value / limit)).max(0.0).floor();
-            format!("{peak} of {} {unit}, {left}% left", figure(limit))
-        }
-        (_, Some(limit)) => format!("{peak} of {} {unit}, OVER", figure(limit)),
-        (_, None) => format!("{peak} {unit}, no limit"),
+    line(out, "limits", "peak/limit, and what is left of it:");
+    for row in table {
+        let _ = writeln!(out, "    {row}");
     }
 }
 
@@ -225,13 +202,8 @@ fn path_error(out: &mut String, report: &Report) {
         .find(|r| (r.sampling_time_s - commands.sampling_time_s).abs() < 1e-9 && r.sampling == commands.sampling)
         .or_else(|| report.path_error.iter().find(|r| (r.sampling_time_s - commands.sampling_time_s).abs() < 1e-9));
     if let Some(row) = row {
-        let text = format!(
-            "at most {} mm off the path, {} mm RMS, {} mm at the end, at {} s",
-            figure(1e3 * row.lateral_max_m),
-            figure(1e3 * row.lateral_rms_m),
-            figure(1e3 * row.end_point_m),
-            row.sampling_time_s
-        );
+        let text =
+            format!("{} beside the path at most, {} from its end", length(row.lateral_max_m), length(row.end_point_m));
         line(out, "path error", &text);
     }
 }
@@ -252,13 +224,35 @@ fn shell(path: &str) -> String {
     if path.chars().all(plain) { path.to_string() } else { format!("'{}'", path.replace('\'', "'\\''")) }
 }
 
+/// A length from metres, with the unit that suits it.
+fn length(metres: f64) -> String {
+    match 1e3 * metres.abs() {
+        mm if mm >= 1e3 => format!("{} m", figure(metres)),
+        mm if mm > 0.0 && mm < LEAST => format!("under {LEAST} mm"),
+        _ => format!("{} mm", figure(1e3 * metres)),
+    }
+}
+
+/// An angle from radians.
+fn degrees(radians: f64) -> String {
+    match radians.to_degrees().abs() {
+        angle if angle > 0.0 && angle < LEAST => format!("under {LEAST}°"),
+        angle => format!("{}°", figure(angle)),
+    }
+}
+
 /// Four significant digits, no trailing zeros, no exponent.
 fn figure(value: f64) -> String {
+    significant(value, 4)
+}
+
+/// So many significant digits, all of those before the point, no trailing zeros, no exponent.
+fn significant(value: f64, digits: i32) -> String {
     if value == 0.0 || !value.is_finite() {
         return if value == 0.0 { "0".into() } else { "?".into() };
     }
-    let digits = (3 - value.abs().log10().floor() as i32).clamp(0, 6) as usize;
-    let text = format!("{value:.digits$}");
+    let places = (digits - 1 - value.abs().log10().floor() as i32).clamp(0, 6) as usize;
+    let text = format!("{value:.places$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     if text.trim_start_matches('-') == "0" { "0".into() } else { text.to_string() }
 }

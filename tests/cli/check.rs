@@ -14,11 +14,11 @@ fn tamper(sandbox: &Sandbox, path: &str, row: usize, column: &str, change: impl 
     sandbox.write(path, lines.join("\n") + "\n");
 }
 
-/// All that a check says, and that it refuses.
+/// All that a check says, on one line, and that it refuses.
 fn refused(sandbox: &Sandbox, path: &str) -> String {
     let run = sandbox.run(&["check", path]).expect(1);
     assert!(run.stdout.contains("CHECKS FAIL"), "{}", run.stdout);
-    run.stdout
+    run.stdout.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 #[test]
@@ -26,7 +26,7 @@ fn a_wheel_that_is_made_to_jump_is_named() {
     let sandbox = Sandbox::compiled();
     tamper(&sandbox, "out/a/commands.csv", 40, "wheel_left_rad_s", |w| w + 4.0);
     let text = refused(&sandbox, "out/a/commands.csv");
-    let refusals: Vec<&str> = text.lines().filter(|l| l.contains("refused: ")).collect();
+    let refusals: Vec<&str> = text.split(" refused ").skip(1).collect();
     assert!(refusals.iter().any(|r| r.contains("`wheel_left`")), "{text}");
     assert!(refusals.iter().any(|r| r.contains("line 51: v_mps is")), "{text}");
     let run = sandbox.run(&["check", "out/a/commands.csv", "--json"]).expect(1);
@@ -63,7 +63,7 @@ fn every_kind_of_tampering_is_refused() {
         let sandbox = Sandbox::compiled();
         tamper(&sandbox, "out/a/commands.csv", row, column, |v| v + by);
         let text = refused(&sandbox, "out/a/commands.csv");
-        assert!(text.contains("refused: "), "{column}: {text}");
+        assert!(text.contains(" refused "), "{column}: {text}");
     }
 }
 
@@ -82,12 +82,12 @@ fn another_map_than_the_one_planned_on_is_noted_and_decides() {
     let sandbox = Sandbox::compiled();
     sandbox.write("maps/first.csv", sandbox.text("maps/first.csv") + "3.025,1.525,0.100\n");
     let text = refused(&sandbox, "out/a/commands.csv");
-    assert!(text.contains("base_link") && text.contains("note: the mission, robot or map are not the ones"), "{text}");
+    assert!(text.contains("base_link") && text.contains(" note the mission, robot or map are not the ones"), "{text}");
 
     let sandbox = Sandbox::compiled();
     sandbox.write("maps/first.csv", sandbox.text("maps/first.csv") + "0.125,0.125,0.000\n");
     let run = sandbox.run(&["check", "out/a/commands.csv"]).expect(0);
-    assert!(run.stdout.contains("all checks hold") && run.stdout.contains("note: "), "{}", run.stdout);
+    assert!(run.stdout.contains("all checks hold") && run.stdout.contains("  note "), "{}", run.stdout);
 }
 
 #[test]
@@ -98,7 +98,7 @@ fn a_stricter_mission_can_be_named() {
         sandbox.text("missions/a.yaml").replace("clearance_m: 0.05", "clearance_m: 0.2"),
     );
     let run = sandbox.run(&["check", "out/a/commands.csv", "--mission", "missions/strict.yaml"]).expect(1);
-    assert!(run.stdout.contains("200.000 mm required"), "{}", run.stdout);
+    assert!(run.stdout.contains("200 mm required"), "{}", run.stdout);
     sandbox.write("missions/slow.yaml", sandbox.text("missions/a.yaml") + "limits: {wheel: {speed_mps: 0.1}}\n");
     let run = sandbox.run(&["check", "out/a/commands.mcap", "--mission", "missions/slow.yaml"]).expect(1);
     assert!(run.stdout.contains("wheel_left"), "{}", run.stdout);

@@ -117,6 +117,38 @@ fn options_of_the_command_line_win_over_the_mission() {
 }
 
 #[test]
+fn trajectory_json_holds_the_rows_of_the_csv_file_and_nothing_else() {
+    let sandbox = Sandbox::new();
+    let run = sandbox.run(&["compile", "missions/a.yaml", "--format", "csv,mcap,trajectory.json"]).expect(0);
+    assert!(run.stdout.contains("commands.csv commands.mcap trajectory.json"), "{}", run.stdout);
+    let rows: Vec<serde_json::Map<String, Value>> =
+        serde_json::from_slice(&sandbox.read("out/a/trajectory.json")).expect("an array of objects");
+    let csv = sandbox.text("out/a/commands.csv");
+    let mut lines = csv.lines().filter(|line| !line.starts_with('#'));
+    let columns: Vec<&str> = lines.next().expect("columns").split(',').collect();
+    let lines: Vec<&str> = lines.collect();
+    assert_eq!(rows.len(), lines.len());
+    for (row, line) in rows.iter().zip(lines) {
+        assert!(row.keys().eq(&columns));
+        // Equal but for the last digit, which serde_json does not always read as it is written.
+        let same = |(a, b): (&Value, &str)| {
+            let [a, b] = [a.as_f64().expect("a number"), b.parse().expect("a number")];
+            (a - b).abs() <= 4.0 * f64::EPSILON * b.abs()
+        };
+        assert!(row.values().zip(line.split(',')).all(same), "{line}");
+    }
+    // Gone with the next run that does not ask for it.
+    sandbox.run(&["compile", "missions/a.yaml"]).expect(0);
+    assert!(!sandbox.exists("out/a/trajectory.json"));
+    sandbox.run(&["compile", "missions/a.yaml", "--format", "trajectory.json"]).expect(0);
+    assert!(sandbox.text("out/a/commands.d").starts_with("out/a/trajectory.json: missions/a.yaml "));
+    assert!(!sandbox.exists("out/a/commands.csv"));
+    sandbox.edit("missions/a.yaml", "x_m: 3.4", "x_m: 2.0");
+    sandbox.run(&["compile", "missions/a.yaml", "--format", "trajectory.json"]).expect(1);
+    assert_eq!(sandbox.list("out/a"), ["report.json", "timings.json"]);
+}
+
+#[test]
 fn json_on_stdout_is_the_report_and_nothing_else() {
     let sandbox = Sandbox::new();
     let run = sandbox.run(&["compile", "missions/a.yaml", "--json"]).expect(0);

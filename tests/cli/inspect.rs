@@ -1,5 +1,7 @@
 //! `inspect` says what it understood of every kind of file.
 
+use serde_json::Value;
+
 use super::sandbox::{Sandbox, golden};
 
 #[test]
@@ -9,12 +11,14 @@ fn every_kind_of_file_can_be_inspected() {
         sandbox.ship(file);
     }
     sandbox.ship("maps/barn_29.pcd");
+    sandbox.ship("maps/site.ply");
     for (name, file) in [
         ("urdf", "robots/conv/conv.urdf"),
         ("robot", "robots/scr_db/robot.yaml"),
         ("mission", "missions/a.yaml"),
         ("csv_points", "maps/first.csv"),
         ("pcd", "maps/barn_29.pcd"),
+        ("ply", "maps/site.ply"),
         ("map_server", "maps/depot.yaml"),
         ("npy", "maps/levine_voxels.npy"),
         ("commands_csv", "out/a/commands.csv"),
@@ -29,6 +33,77 @@ fn every_kind_of_file_can_be_inspected() {
             golden(&format!("inspect_{name}"), &run.stdout);
         }
     }
+}
+
+/// The text with every number replaced, and without alignment: figures of the motion are the planner's.
+fn without_figures(text: &str) -> String {
+    let mut out = String::new();
+    for c in text.chars() {
+        match c {
+            '0'..='9' if out.ends_with('#') => {}
+            '0'..='9' => out.push('#'),
+            ' ' if out.ends_with(' ') => {}
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+#[test]
+fn a_command_file_is_described_with_what_it_brings() {
+    let sandbox = Sandbox::compiled();
+    let said = |file: &str| sandbox.run(&["inspect", file]).expect(0).stdout;
+    let (csv, mcap) = (said("out/a/commands.csv"), said("out/a/commands.mcap"));
+    let rows = sandbox.text("out/a/commands.csv").lines().filter(|l| !l.starts_with('#')).count() - 1;
+    for topic in ["/cmd_vel", "/wheel_velocity_controller/commands", "/joint_states", "/tf"] {
+        let line = mcap.lines().find(|l| l.contains(topic)).unwrap_or_else(|| panic!("{topic}: {mcap}"));
+        assert!(line.ends_with(&format!(" {rows}")), "{line}");
+    }
+    for (name, file) in [("mission.yaml", "missions/a.yaml"), ("robot.urdf", "robots/box_base/box_base.urdf")] {
+        let line = mcap.lines().find(|l| l.contains(name)).unwrap_or_else(|| panic!("{name}: {mcap}"));
+        assert!(line.ends_with(&format!(" {} bytes", sandbox.read(file).len())), "{line}");
+    }
+    let shared =
+        |text: &str| text.lines().skip(1).filter(|l| !l.contains("a.yaml")).map(str::to_owned).collect::<Vec<_>>();
+    assert!(
+        shared(&csv).iter().filter(|l| !l.contains("robot")).all(|line| mcap.contains(line.as_str())),
+        "{csv}{mcap}"
+    );
+    let hash = mcap.split_once("blake3 ").expect("a hash").1.lines().next().expect("a hash").to_owned();
+    golden("inspect_commands_mcap", &without_figures(&mcap.replace(&hash, "…")));
+
+    let json = |file: &str| -> Value {
+        serde_json::from_str(&sandbox.run(&["inspect", file, "--json"]).expect(0).stdout).expect("JSON")
+    };
+    let [csv, mcap] = ["out/a/commands.csv", "out/a/commands.mcap"].map(json);
+    for key in ["commands", "metrics", "limits", "first", "inputs_blake3", "mission", "joints"] {
+        assert_eq!(csv[key], mcap[key], "{key}");
+    }
+    assert_eq!(mcap["commands"]["rows"], rows);
+    assert_eq!(mcap["recorded"]["status"], "certified");
+    assert!(mcap["recorded"]["certificate"]["clearance_proven_m"].as_f64() >= Some(0.05));
+    assert_eq!((mcap["attachments"][0]["name"].as_str(), csv["recorded"].is_null()), (Some("mission.yaml"), true));
+    assert!(mcap["limits"].as_array().is_some_and(|rows| rows.len() == 6));
+
+    // Without its mission a CSV file is described all the same; an MCAP file misses nothing.
+    sandbox.remove("missions/a.yaml");
+    let text = said("out/a/commands.csv");
+    assert!(text.contains("limits     not known: ") && text.contains("which is not there"), "{text}");
+    sandbox.remove("maps/first.csv");
+    assert!(said("out/a/commands.mcap").contains("    wheel_left   "));
+}
+
+#[test]
+fn robots_maps_and_missions_are_described_for_programs_too() {
+    let sandbox = Sandbox::new();
+    let json = |file: &str| -> Value {
+        serde_json::from_str(&sandbox.run(&["inspect", file, "--json"]).expect(0).stdout).expect("JSON")
+    };
+    assert_eq!(json("robots/scr_db/robot.yaml")["joints"][0]["name"], "blade");
+    assert!(json("maps/first.csv")["occupied"].as_u64() > Some(0));
+    let mission = json("missions/a.yaml");
+    assert_eq!((&mission["mission"], &mission["robot"]["name"]), (&Value::from("a"), &Value::from("box_base")));
+    assert_eq!(mission["reads"][0], "missions/a.yaml");
 }
 
 #[test]

@@ -22,8 +22,13 @@ pub fn repository() -> &'static Path {
 }
 
 impl Sandbox {
+    /// Nothing in it.
+    pub fn empty() -> Self {
+        Self { folder: tempfile::tempdir().expect("a temporary folder") }
+    }
+
     pub fn new() -> Self {
-        let sandbox = Self { folder: tempfile::tempdir().expect("a temporary folder") };
+        let sandbox = Self::empty();
         sandbox.ship("robots");
         sandbox.ship("maps/first.csv");
         sandbox.ship("missions/first.yaml");

@@ -42,6 +42,7 @@ pub fn file(table: &CommandTable, base_from_root: Isometry3<f64>, meshes: &[(Str
         robot_yaml: Some("urdf: robot.urdf\n"),
         urdf: URDF,
         report: REPORT,
+        path_csv: None,
         meshes,
     };
     write(&inputs).expect("a good table")
@@ -84,6 +85,7 @@ fn times_that_stamps_cannot_hold_are_refused() {
             robot_yaml: None,
             urdf: URDF,
             report: REPORT,
+            path_csv: None,
             meshes: &[],
         };
         let error = write(&inputs).expect_err("not in stamps");

@@ -6,7 +6,7 @@ use ::mcap::records::{Metadata, Record, op};
 use ::mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::message::MessageError;
-use super::{Attached, McapReadError};
+use super::{Attached, McapReadError, Topic};
 use crate::emit::cdr::Reader;
 use crate::emit::mcap::METADATA;
 
@@ -22,7 +22,10 @@ pub struct Contents {
     pub head: Option<BTreeMap<String, String>>,
     /// In file order.
     pub attachments: Vec<Attached>,
-    topics: BTreeMap<u16, String>,
+    /// Name and schema of each channel.
+    channels: BTreeMap<u16, (String, u16)>,
+    /// Names of the message types.
+    schemas: BTreeMap<u16, String>,
     /// Log time and bytes of each message, in file order, by channel.
     messages: BTreeMap<u16, Messages>,
 }
@@ -69,7 +72,10 @@ impl Contents {
         }
         match ::mcap::parse_record(opcode, body)? {
             Record::Channel(channel) => {
-                self.topics.insert(channel.id, channel.topic);
+                self.channels.insert(channel.id, (channel.topic, channel.schema_id));
+            }
+            Record::Schema { header, .. } => {
+                self.schemas.insert(header.id, header.name);
             }
             Record::Message { header, data } => {
                 self.messages.entry(header.channel_id).or_default().push((header.log_time, data.into_owned()));
@@ -87,8 +93,18 @@ impl Contents {
 
     /// Log time and bytes of a topic's messages, in file order; none where there is no such topic.
     pub fn messages(&self, topic: &str) -> &[(u64, Vec<u8>)] {
-        let channel = self.topics.iter().find(|(_, name)| *name == topic).map(|(id, _)| id);
+        let channel = self.channels.iter().find(|(_, (name, _))| *name == topic).map(|(id, _)| id);
         channel.and_then(|id| self.messages.get(id)).map_or(&[], Vec::as_slice)
+    }
+
+    /// What is in the file, in the order of its channels.
+    pub fn topics(&self) -> Vec<Topic> {
+        let of = |(id, (name, schema)): (&u16, &(String, u16))| Topic {
+            name: name.clone(),
+            kind: self.schemas.get(schema).cloned().unwrap_or_default(),
+            messages: self.messages.get(id).map_or(0, Vec::len),
+        };
+        self.channels.iter().map(of).collect()
     }
 
     /// Decodes all messages of a topic.

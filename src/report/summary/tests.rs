@@ -77,7 +77,7 @@ fn report() -> Report {
 }
 
 fn text(report: &Report, files: &[&str]) -> String {
-    render(&SummaryInputs { mission: "arch_bridges", report, folder: "out/arch_bridges", files })
+    render(&SummaryInputs { mission: "arch_bridges", report, folder: "out/arch_bridges", files, colour: false })
 }
 
 #[test]
@@ -86,29 +86,31 @@ fn a_certified_mission_is_summed_up_on_one_screen() {
     report.judge(&certificate());
     let files = ["commands.csv", "commands.mcap", "commands.d", "path_error.csv", "report.json", "timings.json"];
     let text = text(&report, &files);
-    assert!(text.lines().count() <= 24 && text.lines().all(|l| l.chars().count() <= 110));
-    insta::assert_snapshot!(text, @r"
+    assert!(text.lines().count() <= 24 && text.lines().all(|l| l.chars().count() <= WIDTH), "{text}");
+    insta::assert_snapshot!(text, @"
     arch_bridges: CERTIFIED
 
-      motion      16.81 m, 42.3 s in 424 rows of 0.1 s (mean)
-      path        optimised, 14 pieces, 61 iterations, converged, time law fixed_point
-      clearance   0.05118 m proven, 0.05 m required: 0.00118 m to spare
-                  closest at 12.3 s: left_blade is 0.05231 m from the obstacle at (4.03, 4.07, 0.28) m
-      goal        reached within 0.042 mm and 0.000974°; 1 mm and 0.1° are allowed
-      limits      wheel_left   0.4987 of 0.5 m/s, 0% left    0.312 of 0.5 m/s², 37% left   2 of 2 m/s³, 0% left
-                  wheel_right  0.41 of 0.5 m/s, 18% left     0.3 m/s², no limit            1.1 m/s³, no limit
-                  blade        0.61 of 1 rad/s, 39% left
-      path error  at most 0.24 mm off the path, 0.11 mm RMS, 0.042 mm at the end, at 0.1 s
-      files       out/arch_bridges/: commands.csv commands.mcap commands.d path_error.csv report.json
-                  timings.json
+      motion      16.81 m in 42.3 s, time law fixed_point
+      commands    424 rows of 0.1 s, sampling mean
+      path        optimised, 14 pieces, 61 iterations, converged
+      clearance   51.18 mm proven, 50 mm required: 1.18 mm to spare
+                  closest at 12.3 s: left_blade to the cell at (4.03, 4.07, 0.28)
+      goal        missed by 0.042 mm and under 0.001°; allowed: 1 mm and 0.1°
+      limits      peak/limit, and what is left of it:
+        wheel_left   0.499/0.5 m/s  0%  0.312/0.5 m/s² 37%  2/2 m/s³   0%
+        wheel_right  0.41/0.5 m/s  18%  0.3/∞ m/s²          1.1/∞ m/s³
+        blade        0.61/1 rad/s  39%
+      path error  0.24 mm beside the path at most, 0.042 mm from its end
+      files       out/arch_bridges/: commands.csv commands.mcap commands.d
+                  path_error.csv report.json timings.json
 
-    Proven over the model of robot and map; wheel slip and tracking errors are not in it.
+    Proven of the model; wheel slip and tracking errors are not in it.
     Next: trajc check out/arch_bridges/commands.csv
     ");
 }
 
 #[test]
-fn a_refused_certificate_says_what_was_violated_and_by_how_much() {
+fn a_refused_certificate_says_what_was_reached() {
     let mut report = report();
     let mut refused = certificate();
     refused.clearance_proven = Some(0.0312);
@@ -123,35 +125,32 @@ fn a_refused_certificate_says_what_was_violated_and_by_how_much() {
         Refusal { kind: RefusalKind::Limit, message: "wheel_left reaches 0.55 m/s of 0.5 m/s".into(), time: None },
     ];
     report.judge(&refused);
-    insta::assert_snapshot!(text(&report, &["report.json"]), @r"
+    insta::assert_snapshot!(text(&report, &["report.json"]), @"
     arch_bridges: FAILED in certify; no command file
 
-      reason      left_blade comes within 0.0312 m of the obstacle at (4.03, 4.08, 0.28) m at 12.3 s
-                  wheel_left reaches 0.55 m/s of 0.5 m/s
-      motion      16.81 m, 42.3 s in 424 rows of 0.1 s (mean)
-      path        optimised, 14 pieces, 61 iterations, converged, time law fixed_point
-      clearance   0.0312 m proven, 0.05 m required: 0.0188 m short
-                  closest at 12.3 s: left_blade is 0.05231 m from the obstacle at (4.03, 4.07, 0.28) m
-      limits      wheel_left   0.55 of 0.5 m/s, OVER         0.312 of 0.5 m/s², 37% left   2 of 2 m/s³, 0% left
-                  wheel_right  0.41 of 0.5 m/s, 18% left     0.3 m/s², no limit            1.1 m/s³, no limit
-                  blade        0.61 of 1 rad/s, 39% left
+      motion      16.81 m in 42.3 s, time law fixed_point
+      commands    424 rows of 0.1 s, sampling mean
+      path        optimised, 14 pieces, 61 iterations, converged
+      clearance   31.2 mm proven, 50 mm required: 18.8 mm short
+                  closest at 12.3 s: left_blade to the cell at (4.03, 4.07, 0.28)
+      limits      peak/limit, and what is left of it:
+        wheel_left   0.55/0.5 m/s OVER  0.312/0.5 m/s² 37%  2/2 m/s³   0%
+        wheel_right  0.41/0.5 m/s  18%  0.3/∞ m/s²          1.1/∞ m/s³
+        blade        0.61/1 rad/s  39%
       files       out/arch_bridges/: report.json
     ");
 }
 
 #[test]
-fn an_unreachable_goal_is_told_with_its_numbers() {
+fn a_failure_names_its_stage_and_leaves_the_reason_to_the_diagnostic() {
     let mut report = Report::new(InputsPart::default());
     let diagnostic = Diagnostic::failure("search/exhausted", "no path from start to goal at this resolution")
         .number("expanded", 18_321)
         .number("closest_m", 1.25);
     report.fail(&Diagnostics(vec![diagnostic]));
-    insta::assert_snapshot!(text(&report, &["report.json"]), @r"
+    insta::assert_snapshot!(text(&report, &["report.json"]), @"
     arch_bridges: FAILED in search; no command file
 
-      reason      no path from start to goal at this resolution
-                  expanded = 18321
-                  closest_m = 1.25
       files       out/arch_bridges/: report.json
     ");
 }
@@ -176,6 +175,86 @@ fn figures_keep_four_digits_and_no_negative_zero() {
         assert_eq!(figure(value), wanted, "{value}");
     }
     assert_eq!((figure(-1e-12), figure(f64::NAN), figure(0.1)), ("0".into(), "?".into(), "0.1".into()));
+}
+
+#[test]
+fn small_lengths_and_angles_are_told_as_such() {
+    let cases = [
+        (0.0, "0 mm"),
+        (4e-10, "under 0.001 mm"),
+        (4.2e-5, "0.042 mm"),
+        (0.05118, "51.18 mm"),
+        (-0.0012, "-1.2 mm"),
+        (1.5, "1.5 m"),
+    ];
+    for (metres, wanted) in cases {
+        assert_eq!(length(metres), wanted);
+    }
+    assert_eq!([0.0, 1e-9, 1.7e-3].map(degrees), ["0°", "under 0.001°", "0.0974°"]);
+}
+
+/// A certified report of a robot with these joints, which take up `share` of their limits.
+fn with_joints(names: &[&str], share: f64) -> Report {
+    let mut report = report();
+    let mut proven = certificate();
+    proven.limits.truncate(6);
+    for name in names {
+        for (quantity, limit) in [("speed", 1.5), ("acceleration", 3.0), ("jerk", 15.0)] {
+            proven.limits.push(check(name, quantity, share * limit, Some(limit)));
+        }
+    }
+    report.judge(&proven);
+    report
+}
+
+#[test]
+fn a_screen_of_80_columns_holds_an_arm_and_a_robot_without_joints() {
+    let arm = ["shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2"];
+    let files = ["commands.csv", "commands.mcap", "path_error.csv", "commands.d", "report.json", "timings.json"];
+    for names in [&arm[..], &arm[..1], &[]] {
+        let text = text(&with_joints(names, 0.8765432), &files);
+        assert!(text.lines().count() <= 24, "{text}");
+        assert!(text.lines().all(|l| l.chars().count() <= WIDTH), "{text}");
+    }
+    insta::assert_snapshot!(text(&with_joints(&arm, 0.8765432), &files), @"
+    arch_bridges: CERTIFIED
+
+      motion      16.81 m in 42.3 s, time law fixed_point
+      commands    424 rows of 0.1 s, sampling mean
+      path        optimised, 14 pieces, 61 iterations, converged
+      clearance   51.18 mm proven, 50 mm required: 1.18 mm to spare
+                  closest at 12.3 s: left_blade to the cell at (4.03, 4.07, 0.28)
+      goal        missed by 0.042 mm and under 0.001°; allowed: 1 mm and 0.1°
+      limits      peak/limit, and what is left of it:
+        wheel_left     0.499/0.5 m/s   0%  0.312/0.5 m/s² 37%  2/2 m/s³        0%
+        wheel_right    0.41/0.5 m/s   18%  0.3/∞ m/s²          1.1/∞ m/s³
+        shoulder_pan   1.31/1.5 rad/s 12%  2.63/3 rad/s²  12%  13.1/15 rad/s³ 12%
+        shoulder_lift  1.31/1.5 rad/s 12%  2.63/3 rad/s²  12%  13.1/15 rad/s³ 12%
+        elbow          1.31/1.5 rad/s 12%  2.63/3 rad/s²  12%  13.1/15 rad/s³ 12%
+        wrist_1        1.31/1.5 rad/s 12%  2.63/3 rad/s²  12%  13.1/15 rad/s³ 12%
+        wrist_2        1.31/1.5 rad/s 12%  2.63/3 rad/s²  12%  13.1/15 rad/s³ 12%
+      path error  0.24 mm beside the path at most, 0.042 mm from its end
+      files       out/arch_bridges/: commands.csv commands.mcap path_error.csv
+                  commands.d report.json timings.json
+
+    Proven of the model; wheel slip and tracking errors are not in it.
+    Next: trajc check out/arch_bridges/commands.csv
+    ");
+    let many: Vec<String> = (0..12).map(|k| format!("joint_{k}")).collect();
+    let many: Vec<&str> = many.iter().map(String::as_str).collect();
+    assert!(text(&with_joints(&many, 0.5), &[]).contains("    and 6 more in report.json\n"));
+}
+
+#[test]
+fn colour_touches_the_verdict_alone() {
+    let report = with_joints(&["blade"], 0.5);
+    let inputs = SummaryInputs { mission: "a", report: &report, folder: "out/a", files: &[], colour: true };
+    let coloured = render(&inputs);
+    assert!(coloured.starts_with("a: \u{1b}[1;32mCERTIFIED\u{1b}[0m\n"));
+    assert_eq!(
+        coloured.replace("\u{1b}[1;32m", "").replace("\u{1b}[0m", ""),
+        render(&SummaryInputs { colour: false, ..inputs })
+    );
 }
 
 #[test]

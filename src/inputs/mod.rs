@@ -1,115 +1,18 @@
-//! Reads everything that a mission names. The only reader of input files; stages get text and bytes.
+//! Reads everything that a mission or a command file names. The only reader of input files; stages get text and bytes.
+//!
+//! [`read`] reads a mission; [`commands::load`] a command file with all that its proof rests on.
 
-use std::cell::RefCell;
-use std::io;
+pub mod commands;
+mod disk;
+
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
 
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::map;
 use crate::mission::{self, Mission, PathSpec};
 use crate::pipeline::{Inputs, MapFile, TextFile};
-use crate::robot::Files;
 use crate::robot::spec;
-
-/// A file's name and bytes.
-type Named = (String, Vec<u8>);
-
-/// Reads files from the disk and remembers which.
-#[derive(Clone, Default)]
-pub struct Disk {
-    /// Path and hash of each file read, in order.
-    read: Rc<RefCell<Vec<(PathBuf, blake3::Hash)>>>,
-    /// What the robot stage read.
-    meshes: Rc<RefCell<Vec<Named>>>,
-}
-
-impl Disk {
-    /// Paths of all files read so far, in order, each once.
-    pub fn paths(&self) -> Vec<PathBuf> {
-        self.read.borrow().iter().map(|(path, _)| path.clone()).collect()
-    }
-
-    /// Meshes read so far: name by which the robot stage asked for each, and bytes.
-    pub fn meshes(&self) -> Vec<Named> {
-        self.meshes.borrow().clone()
-    }
-
-    fn bytes(&self, path: &Path) -> io::Result<Vec<u8>> {
-        if path.is_dir() {
-            return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a folder"));
-        }
-        let bytes = std::fs::read(path)?;
-        let mut read = self.read.borrow_mut();
-        if !read.iter().any(|(known, _)| known == path) {
-            read.push((path.to_path_buf(), blake3::hash(&bytes)));
-        }
-        Ok(bytes)
-    }
-
-    /// One hash over the bytes of all files read: of their hashes, in order.
-    pub fn hash(&self) -> String {
-        let mut hasher = blake3::Hasher::new();
-        for (_, hash) in self.read.borrow().iter() {
-            hasher.update(hash.as_bytes());
-        }
-        hasher.finalize().to_hex().to_string()
-    }
-
-    /// Reads bytes, or says which file could not be read and who names it.
-    ///
-    /// # Errors
-    /// The file is missing or unreadable.
-    pub fn binary(&self, path: &Path, named_by: Option<&crate::diag::Span>) -> Result<Vec<u8>, Diagnostics> {
-        self.bytes(path).map_err(|error| unreadable(path, &error, named_by).into())
-    }
-
-    /// Reads a text.
-    ///
-    /// # Errors
-    /// The file is missing, unreadable or not UTF-8.
-    pub fn text(&self, path: &Path, named_by: Option<&crate::diag::Span>) -> Result<TextFile, Diagnostics> {
-        let bytes = self.binary(path, named_by)?;
-        let name = path.display().to_string();
-        match String::from_utf8(bytes) {
-            Ok(text) => Ok(TextFile { name, text }),
-            Err(error) => {
-                let at = error.utf8_error().valid_up_to();
-                let message = format!("`{name}` is not UTF-8 text: byte {at} begins no character");
-                Err(Diagnostic::error("input/not-text", message).file(name).hint("save the file as UTF-8").into())
-            }
-        }
-    }
-}
-
-impl Files for Disk {
-    fn read(&mut self, path: &Path) -> io::Result<Vec<u8>> {
-        let bytes = self.bytes(path)?;
-        let name = path.display().to_string();
-        let mut meshes = self.meshes.borrow_mut();
-        if !meshes.iter().any(|(known, _)| *known == name) {
-            meshes.push((name, bytes.clone()));
-        }
-        Ok(bytes)
-    }
-}
-
-fn unreadable(path: &Path, error: &io::Error, named_by: Option<&crate::diag::Span>) -> Diagnostic {
-    let name = path.display().to_string();
-    let (what, hint) = match error.kind() {
-        io::ErrorKind::NotFound => (
-            format!("no such file: `{name}`"),
-            if named_by.is_some() { "paths are relative to the file that names them" } else { "check the path" },
-        ),
-        io::ErrorKind::IsADirectory => (format!("`{name}` is a folder, expected a file"), "name the file in it"),
-        _ => (format!("cannot read `{name}`: {error}"), "check its permissions"),
-    };
-    let diagnostic = Diagnostic::error("input/unreadable", what).hint(hint);
-    match named_by {
-        Some(span) => diagnostic.at(span),
-        None => diagnostic.file(name),
-    }
-}
+pub use disk::{Disk, Named};
 
 /// Everything a mission names, read from disk.
 ///
@@ -117,21 +20,26 @@ fn unreadable(path: &Path, error: &io::Error, named_by: Option<&crate::diag::Spa
 /// All that a reader finds wrong: missing files, bad YAML.
 pub fn read(mission_path: &Path) -> Result<(Inputs, Disk), Diagnostics> {
     let disk = Disk::default();
-    let text = disk.text(mission_path, None)?;
-    let mission = mission::parse(&text.name, &text.text)?;
-    let inputs = read_named(mission, text, &folder_of(mission_path), &disk)?;
+    let inputs = read_with(mission_path, &disk, &|named| Ok(Some(named)))?;
     Ok((inputs, disk))
 }
 
-fn read_named(mission: Mission, text: TextFile, folder: &Path, disk: &Disk) -> Result<Inputs, Diagnostics> {
+/// Which map file to read, if any, where the mission means this one.
+type ChooseMap<'a> = &'a dyn Fn(PathBuf) -> Result<Option<PathBuf>, Diagnostics>;
+
+fn read_with(mission_path: &Path, disk: &Disk, choose_map: ChooseMap<'_>) -> Result<Inputs, Diagnostics> {
+    let text = disk.text(mission_path, None)?;
+    let mission = mission::parse(&text.name, &text.text)?;
+    let folder = folder_of(mission_path);
     let mut faults = Vec::new();
     let robot_path = tidy(&folder.join(&mission.robot));
     let robot = read_robot(&robot_path, &mission, disk).map_err(|d| faults.extend(d.0)).ok();
     let map = match &mission.map {
         None => None,
         Some(spec) => {
-            let path = tidy(&folder.join(&spec.file));
-            read_map(&path, &mission, disk).map_err(|d| faults.extend(d.0)).ok()
+            let chosen = choose_map(tidy(&folder.join(&spec.file)));
+            let map = chosen.and_then(|path| path.map(|path| read_map(&path, &mission, disk)).transpose());
+            map.map_err(|d| faults.extend(d.0)).ok().flatten()
         }
     };
     let path_csv = match &mission.path {

@@ -1,0 +1,134 @@
+//! Files as they lie on the disk, or as they are attached to a command file.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+use super::tidy;
+use crate::diag::{Diagnostic, Diagnostics, Span};
+use crate::pipeline::TextFile;
+use crate::robot::Files;
+
+/// A file's name and bytes.
+pub type Named = (String, Vec<u8>);
+
+/// Reads files and remembers which.
+#[derive(Clone, Default)]
+pub struct Disk {
+    /// Path and hash of each file read, in order.
+    read: Rc<RefCell<Vec<(PathBuf, blake3::Hash)>>>,
+    /// What the robot stage read.
+    meshes: Rc<RefCell<Vec<Named>>>,
+    /// Texts and meshes, where they are not to come from the disk. Keys are tidy paths.
+    attached: Option<Rc<BTreeMap<PathBuf, Vec<u8>>>>,
+}
+
+impl Disk {
+    /// Texts and meshes come from these files alone, found by their paths (tidied); meshes also by a file name that only one of
+    /// them has. Maps still come from the disk.
+    pub(super) fn attached(files: BTreeMap<PathBuf, Vec<u8>>) -> Self {
+        Self { attached: Some(Rc::new(files)), ..Self::default() }
+    }
+
+    /// Paths of all files read so far, in order, each once.
+    pub fn paths(&self) -> Vec<PathBuf> {
+        self.read.borrow().iter().map(|(path, _)| path.clone()).collect()
+    }
+
+    /// Meshes read so far: the path by which the robot stage asked for each, and bytes.
+    pub fn meshes(&self) -> Vec<Named> {
+        self.meshes.borrow().clone()
+    }
+
+    /// One hash over the bytes of all files read: of their hashes, in order.
+    pub fn hash(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        for (_, hash) in self.read.borrow().iter() {
+            hasher.update(hash.as_bytes());
+        }
+        hasher.finalize().to_hex().to_string()
+    }
+
+    fn remember(&self, path: &Path, bytes: Vec<u8>) -> Vec<u8> {
+        let mut read = self.read.borrow_mut();
+        if !read.iter().any(|(known, _)| known == path) {
+            read.push((path.to_path_buf(), blake3::hash(&bytes)));
+        }
+        bytes
+    }
+
+    fn on_disk(&self, path: &Path) -> io::Result<Vec<u8>> {
+        if path.is_dir() {
+            return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a folder"));
+        }
+        Ok(self.remember(path, std::fs::read(path)?))
+    }
+
+    /// A text or mesh.
+    fn bytes(&self, path: &Path) -> io::Result<Vec<u8>> {
+        let Some(attached) = &self.attached else { return self.on_disk(path) };
+        let found = attached.get(&tidy(path)).or_else(|| {
+            let mut alike = attached.iter().filter(|(known, _)| known.file_name() == path.file_name());
+            let (_, first) = alike.next()?;
+            alike.next().is_none().then_some(first)
+        });
+        let bytes = found.cloned().ok_or_else(|| io::Error::new(io::ErrorKind::NotFound, "is not attached"))?;
+        Ok(self.remember(path, bytes))
+    }
+
+    /// Reads bytes from the disk, or says which file could not be read and who names it.
+    ///
+    /// # Errors
+    /// The file is missing or unreadable.
+    pub fn binary(&self, path: &Path, named_by: Option<&Span>) -> Result<Vec<u8>, Diagnostics> {
+        self.on_disk(path).map_err(|error| unreadable(path, &error, named_by).into())
+    }
+
+    /// Reads a text.
+    ///
+    /// # Errors
+    /// The file is missing, unreadable or not UTF-8.
+    pub fn text(&self, path: &Path, named_by: Option<&Span>) -> Result<TextFile, Diagnostics> {
+        let bytes = self.bytes(path).map_err(|error| unreadable(path, &error, named_by))?;
+        let name = path.display().to_string();
+        match String::from_utf8(bytes) {
+            Ok(text) => Ok(TextFile { name, text }),
+            Err(error) => {
+                let at = error.utf8_error().valid_up_to();
+                let message = format!("`{name}` is not UTF-8 text: byte {at} begins no character");
+                Err(Diagnostic::error("input/not-text", message).file(name).hint("save the file as UTF-8").into())
+            }
+        }
+    }
+}
+
+impl Files for Disk {
+    fn read(&mut self, path: &Path) -> io::Result<Vec<u8>> {
+        let bytes = self.bytes(path)?;
+        let name = path.display().to_string();
+        let mut meshes = self.meshes.borrow_mut();
+        if !meshes.iter().any(|(known, _)| *known == name) {
+            meshes.push((name, bytes.clone()));
+        }
+        Ok(bytes)
+    }
+}
+
+fn unreadable(path: &Path, error: &io::Error, named_by: Option<&Span>) -> Diagnostic {
+    let name = path.display().to_string();
+    let (what, hint) = match error.kind() {
+        io::ErrorKind::NotFound => (
+            format!("no such file: `{name}`"),
+            if named_by.is_some() { "paths are relative to the file that names them" } else { "check the path" },
+        ),
+        io::ErrorKind::IsADirectory => (format!("`{name}` is a folder, expected a file"), "name the file in it"),
+        _ => (format!("cannot read `{name}`: {error}"), "check its permissions"),
+    };
+    let diagnostic = Diagnostic::error("input/unreadable", what).hint(hint);
+    match named_by {
+        Some(span) => diagnostic.at(span),
+        None => diagnostic.file(name),
+    }
+}
