@@ -14,8 +14,16 @@ use crate::diag::{Describe, Diagnostic, Diagnostics};
 pub use depfile::{depfile, spelled};
 
 /// Every file that this program writes into an output folder, command files first.
-pub const FILES: [&str; 7] =
-    ["commands.csv", "commands.mcap", "commands.d", "path_error.csv", "report.json", "report.html", "timings.json"];
+pub const FILES: [&str; 8] = [
+    "commands.csv",
+    "commands.mcap",
+    "commands.d",
+    "path_error.csv",
+    "report.json",
+    "report.html",
+    "report.svg",
+    "timings.json",
+];
 
 /// A file or folder that could not be made, moved or removed.
 #[derive(Debug, thiserror::Error)]
