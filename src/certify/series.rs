@@ -15,7 +15,8 @@ use crate::robot::RobotModel;
 pub struct Instant {
     /// s.
     pub time: f64,
-    /// From the robot's surface to the nearest obstacle, m; negative: overlap; infinite: farther than was looked.
+    /// From the robot's surface to the nearest obstacle, m; not positive: how deep it is in one of those that it meets; infinite: farther
+    /// than was looked.
     pub distance: f64,
 }
 
@@ -78,11 +79,10 @@ impl<'a> Near<'a> {
         self.obstacles.near(&all.grown(least.0.min(reach).max(0.0)), &mut self.found);
         for (shape, bounds) in shapes.iter().zip(&bounds) {
             let mut order: Vec<(f64, &Aabb)> = self.found.iter().map(|b| (gap(bounds, b), b)).collect();
-            // Overlaps are measured too: boxes whose bounds touch are always looked at.
-            order.retain(|(gap, _)| *gap <= least.0.clamp(0.0, reach));
+            order.retain(|(gap, _)| *gap <= least.0.min(reach));
             order.sort_by(|a, b| a.0.total_cmp(&b.0));
             for (gap, obstacle) in order {
-                if gap > least.0.max(0.0) {
+                if least.0 <= 0.0 || gap > least.0 {
                     break;
                 }
                 improve(&mut least, shape, obstacle);

@@ -7,7 +7,7 @@ use crate::robot::{MotionLimits, RobotModel};
 /// Joints with charts; of more, the table alone tells.
 const MOST_JOINTS: usize = 6;
 /// Points of a chart's line.
-const POINTS: usize = 900;
+const POINTS: usize = 700;
 /// px, as drawn; the page scales it.
 const SIZE: [f64; 2] = [400.0, 200.0];
 

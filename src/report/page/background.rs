@@ -62,6 +62,9 @@ pub(super) fn comparison(inputs: &PageInputs<'_>) -> String {
     if commanded.is_some() {
         text.push("As commanded: what the robot does, the time law's timing included.");
     }
+    if change {
+        text.push("Change: from initial to as commanded.");
+    }
     if trajectory.is_some_and(|t| t.source == "search") {
         text.push("No smooth trajectory could be certified: the robot drives the search's own path, with stops.");
     }

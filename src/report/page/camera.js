@@ -35,7 +35,7 @@ class Camera {
     let [near, far] = [0.1, 1e4];
     for (let i = 0; i < 40; i += 1) {
       this.distance = Math.sqrt(near * far);
-      const inside = this.project(points).every(([x, y, w]) => w > 0 && Math.abs(x) < 0.93 && Math.abs(y) < 0.9);
+      const inside = this.project(points).every(([x, y, w]) => w > 0 && Math.abs(x) < 0.93 && y < 0.8 && y > -0.93);
       if (inside) far = this.distance; else near = this.distance;
     }
     this.distance = far;

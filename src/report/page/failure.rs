@@ -6,25 +6,38 @@ use super::html::{self, definitions, escape};
 use super::{PageInputs, degrees, figure, grouped, mm};
 use crate::report::schema::Failure;
 
-/// Figures that words exist for: name, label, how it is said. The others follow with their names.
-const KNOWN: [(&str, &str, fn(f64) -> String); 9] = [
-    ("missing_m", "Missing", missing),
-    ("closest_to_goal_m", "From there to the goal", metres),
-    ("narrowest_gap_m", "Narrowest place of the widest way", metres),
-    ("least_gap_needed_m", "The base needs at least", metres),
-    ("tightest_clearance_m", "Clearance there", mm),
-    ("clearance_m", "Clearance there", mm),
-    ("clearance_required_m", "Clearance required", mm),
-    ("expanded", "States searched", |v| grouped(v as usize)),
-    ("labels", "Partial paths made", |v| grouped(v as usize)),
-];
+/// What is said of a figure.
+enum Say {
+    /// Of a number.
+    Number(fn(f64) -> String),
+    /// A text as it is.
+    Text,
+    /// A place on the floor, its figures' names begin so: `_x_m`, `_y_m` and, if there, `_yaw_rad` follow.
+    Pose,
+    /// Joints with their values.
+    Joints,
+}
 
-/// Poses by the beginning of their figures' names, and their labels.
-const POSES: [(&str, &str); 4] = [
-    ("closest", "Closest pose reached"),
-    ("narrowest_gap", "Narrowest place at"),
-    ("tightest", "Too tight at"),
-    ("nearest_free", "Nearest free pose"),
+/// Figures that words exist for, in the order in which they are told; others follow with their names.
+const KNOWN: [(&str, &str, Say); 18] = [
+    ("missing_m", "Missing", Say::Number(missing)),
+    ("closest", "Closest pose reached", Say::Pose),
+    ("closest_to_goal_m", "From there to the goal", Say::Number(metres)),
+    ("tightest", "Tightest place of the best way", Say::Pose),
+    ("tightest_posture", "Joints there", Say::Joints),
+    ("tightest_link", "Link that is too close", Say::Text),
+    ("tightest_clearance_m", "Its clearance", Say::Number(room)),
+    ("narrowest_gap", "Narrowest place of the widest way", Say::Pose),
+    ("narrowest_gap_m", "Its width", Say::Number(metres)),
+    ("least_gap_needed_m", "Width that the base needs", Say::Number(metres)),
+    ("link", "Link in the way", Say::Text),
+    ("posture", "Joints there", Say::Joints),
+    ("clearance_m", "Its clearance", Say::Number(room)),
+    ("clearance_required_m", "Clearance required", Say::Number(mm)),
+    ("nearest_free", "Nearest free pose", Say::Pose),
+    ("at_fault", "Shut in is the", Say::Text),
+    ("expanded", "States searched", Say::Number(|v| grouped(v as usize))),
+    ("labels", "Partial paths made", Say::Number(|v| grouped(v as usize))),
 ];
 
 fn metres(value: f64) -> String {
@@ -34,6 +47,31 @@ fn metres(value: f64) -> String {
 /// A gap or room that is too small: in cm, as people say it.
 fn missing(value: f64) -> String {
     format!("{} cm", figure((1e3 * value).ceil() / 10.0))
+}
+
+/// A distance from an obstacle, or how deep it is in.
+fn room(value: f64) -> String {
+    if value < 0.0 { format!("none: {} deep in the obstacle", mm(-value)) } else { mm(value) }
+}
+
+/// The figures to say first, for the page's top: name, value, what is below it.
+pub(super) fn key_figures(failure: &Failure) -> Vec<(&'static str, String, String)> {
+    let value = |key: &str| failure.numbers.get(key).and_then(Value::as_f64);
+    let mut out = Vec::new();
+    if let Some(v) = value("missing_m") {
+        let link = ["tightest_link", "link"].into_iter().find_map(|key| failure.numbers.get(key)?.as_str());
+        out.push(("Missing", missing(v), link.map_or("of room".into(), |link| format!("of room for {link}"))));
+    }
+    if let Some(v) = value("closest_to_goal_m") {
+        out.push(("Got as close as", metres(v), "to the goal".into()));
+    }
+    if let (Some(width), Some(needed)) = (value("narrowest_gap_m"), value("least_gap_needed_m")) {
+        out.push(("Narrowest gap", metres(width), format!("the base needs {}", metres(needed))));
+    }
+    if let Some(v) = value("expanded") {
+        out.push(("Searched", grouped(v as usize), "states".into()));
+    }
+    out
 }
 
 /// The stage, the reason and its figures; nothing for a mission that is certified.
@@ -73,43 +111,27 @@ fn stage(failure: &Failure) -> &str {
 }
 
 fn figures(numbers: &Map<String, Value>) -> Vec<(String, String)> {
-    let value = |key: &str| numbers.get(key).and_then(Value::as_f64);
     let mut out = Vec::new();
-    let mut said: Vec<String> = ["refusals", "places"].map(str::to_owned).to_vec();
-    for (prefix, label) in POSES {
-        let keys = ["x_m", "y_m", "yaw_rad"].map(|end| format!("{prefix}_{end}"));
-        if let (Some(x), Some(y)) = (value(&keys[0]), value(&keys[1])) {
-            let heading = value(&keys[2]).map_or(String::new(), |a| format!(", heading {}", degrees(a)));
-            out.push((label.to_owned(), escape(&format!("({x:.2}, {y:.2}) m{heading}").replace('-', "−"))));
-            said.extend(keys);
-        }
-        for key in [format!("{prefix}_posture")].into_iter().chain((prefix == "tightest").then(|| "posture".to_owned()))
-        {
-            if let Some(posture) = numbers.get(&key).and_then(Value::as_object).filter(|p| !p.is_empty()) {
-                let joints =
-                    posture.iter().map(|(name, v)| format!("{name} {}", v.as_f64().map_or("–".into(), figure)));
-                out.push(("with joints at".into(), escape(&joints.collect::<Vec<_>>().join(", "))));
-            }
-            said.push(key);
-        }
-    }
-    for key in ["tightest_link", "link"] {
-        if let Some(link) = numbers.get(key).and_then(Value::as_str) {
-            out.push(("Link in the way".into(), escape(link)));
-            said.push(key.to_owned());
-        }
-    }
-    if let Some(end) = numbers.get("at_fault").and_then(Value::as_str) {
-        out.push(("Shut in".into(), escape(&format!("the {end}"))));
-        said.push("at_fault".into());
-    }
+    let mut told = vec!["refusals".to_owned(), "places".to_owned()];
     for (key, label, say) in KNOWN {
-        if let Some(v) = value(key) {
-            out.push((label.to_owned(), escape(&say(v))));
-            said.push(key.to_owned());
+        let value = |end: &str| numbers.get(&format!("{key}{end}"));
+        let number = |end: &str| value(end).and_then(Value::as_f64);
+        let text = match say {
+            Say::Number(say) => number("").map(say),
+            Say::Text => value("").and_then(Value::as_str).map(str::to_owned),
+            Say::Joints => value("").and_then(Value::as_object).filter(|posture| !posture.is_empty()).map(joints),
+            Say::Pose => number("_x_m").zip(number("_y_m")).map(|(x, y)| {
+                let heading = number("_yaw_rad").map_or(String::new(), |a| format!(", heading {}", degrees(a)));
+                format!("({x:.2}, {y:.2}) m").replace('-', "−") + &heading
+            }),
+        };
+        match say {
+            Say::Pose => told.extend(["_x_m", "_y_m", "_yaw_rad"].map(|end| format!("{key}{end}"))),
+            _ => told.push(key.to_owned()),
         }
+        out.extend(text.map(|text| (label.to_owned(), escape(&text))));
     }
-    for (key, v) in numbers.iter().filter(|(key, _)| !said.contains(key)) {
+    for (key, v) in numbers.iter().filter(|(key, _)| !told.contains(key)) {
         let text = match v {
             Value::String(text) => text.clone(),
             Value::Number(n) => n.as_f64().map_or_else(|| n.to_string(), figure),
@@ -118,4 +140,9 @@ fn figures(numbers: &Map<String, Value>) -> Vec<(String, String)> {
         out.push((key.replace('_', " "), escape(&text)));
     }
     out
+}
+
+fn joints(posture: &Map<String, Value>) -> String {
+    let of = |(name, value): (&String, &Value)| format!("{name} {}", value.as_f64().map_or("–".into(), figure));
+    posture.iter().map(of).collect::<Vec<_>>().join(", ")
 }

@@ -41,6 +41,9 @@ fn key(name: &str, value: &str, below: &str) -> (String, String) {
 
 fn key_figures(report: &Report) -> Vec<(String, String)> {
     let mut out = Vec::new();
+    for (name, value, below) in report.failure.iter().flat_map(super::failure::key_figures) {
+        out.push(key(name, &value, &below));
+    }
     if let Some(commands) = &report.commands {
         let length =
             report.trajectory.as_ref().and_then(|t| t.metrics).map(|m| format!("{} m driven", figure(m.length_m)));
@@ -61,11 +64,7 @@ fn key_figures(report: &Report) -> Vec<(String, String)> {
     }
     if let Some((row, share)) = tightest(&report.limits) {
         let name = format!("{} {}", row.actuator.replace('_', " "), row.quantity);
-        out.push(key(
-            "Closest to a limit",
-            &format!("{} %", figure((1e3 * share).round() / 10.0)),
-            &format!("of {name}"),
-        ));
+        out.push(key("Closest to a limit", &super::percent(share), &format!("of {name}")));
     }
     if let Some(row) = plots::own_row(report) {
         out.push(key("Path error", &mm(row.lateral_max_m), &format!("at most, at {} s a row", row.sampling_time_s)));
@@ -130,14 +129,10 @@ pub(super) fn view(inputs: &PageInputs<'_>, distances: Option<&Distances>, facto
     if inputs.map.is_none() {
         notes.push("The mission has no map: nothing is drawn around the path, and clearance was not checked.".into());
     }
-    if let Some((table, _)) = motion
-        && table.rows.len() > super::scene::MOST_ROWS
-    {
-        let every = table.rows.len().div_ceil(super::scene::MOST_ROWS);
-        notes.push(format!(
-            "Of {} rows every {every}th is shown here; the command file has all.",
-            grouped(table.rows.len())
-        ));
+    let every = motion.map_or(1, |(table, _)| super::scene::stride(table));
+    if let Some((table, _)) = motion.filter(|_| every > 1) {
+        let rows = grouped(table.rows.len());
+        notes.push(format!("Of {rows} rows one of every {every} is shown here; the command file has all."));
     }
     if motion.is_some() {
         notes.push(

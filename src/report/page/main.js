@@ -21,31 +21,30 @@ function readWorld(data) {
   const seen = [...(way || []), ...places.map((p) => p.pose), ...(data.gap ? [data.gap.at] : [])];
   const low = [0, 1].map((a) => Math.min(...seen.map((p) => p[a])) - reach);
   const high = [0, 1].map((a) => Math.max(...seen.map((p) => p[a])) + reach);
-  const { map, closest, gap } = data;
+  const { map, closest } = data, gap = data.gap && data.gap.width < data.gap.needed - 1e-9 ? data.gap : null;
   const floor = map ? { low: map.origin.slice(0, 2), high: map.end } : { low: low.map((v) => v - 0.6), high: high.map((v) => v + 0.6) };
   const span = Math.max(high[0] - low[0], high[1] - low[1]);
   const rings = [];
   if (gap) rings.push({ at: gap.at, radius: Math.max(0.5 * gap.needed, 0.1) });
+  if (closest && closest.obstacle) rings.push({ at: [0, 1].map((a) => 0.5 * (closest.obstacle.min[a] + closest.obstacle.max[a])), radius: 0.5 * reach });
   return {
     robot, rows, places, map, reach,
     boxes: map && readBoxes(map),
     floor: { ...floor, step: span > 60 ? 10 : span > 25 ? 5 : 1 },
     unit: span, low, high, way,
     route: data.route.length > 1 ? data.route : null,
-    tint: rows && timesAlong(rows, Math.max(0.04, rows.count * rows.step / 4000), reach)
+    tint: rows && timesAlong(rows, Math.max(0.025, wayLength(rows, reach) / 1500), reach)
       .flatMap((t) => { const s = stateAt(rows, t); return footprint(robot, s.pose, s.joints); }),
-    ghosts: rows ? ghostTimes(rows, reach).map((t) => { const s = stateAt(rows, t); return shapeFrames(robot, s.pose, s.joints); }) : [],
+    ghosts: rows ? ghostTimes(rows, reach).map((t) => { const s = stateAt(rows, t); return { pose: s.pose, frames: shapeFrames(robot, s.pose, s.joints) }; }) : [],
     rings, gap, closest,
     cell: closest && closest.obstacle,
     labels: labelsOf(places, gap, closest),
   };
 }
 
-/** Instants at which postures are drawn along the way. */
-function ghostTimes(rows, lever) {
-  const all = timesAlong(rows, 0.02, lever);
-  const every = Math.max(1, Math.ceil(all.length / GHOSTS));
-  return all.filter((_, k) => k % every === 0).concat(rows.end);
+/** Instants at which postures are drawn along the way: not so many that they hide each other. */
+function ghostTimes(rows, reach) {
+  return timesAlong(rows, Math.max(1.1 * reach, wayLength(rows, reach) / GHOSTS), reach);
 }
 
 /** Words in the view. */
@@ -54,9 +53,15 @@ function labelsOf(places, gap, closest) {
   if (gap) labels.push({ at: [...gap.at, 0.3], text: `${gap.width.toFixed(2)} m wide, ${gap.needed.toFixed(2)} m needed`, alert: true });
   if (closest && closest.obstacle) {
     const { min, max } = closest.obstacle;
-    labels.push({ at: [0, 1, 2].map((a) => 0.5 * (min[a] + max[a])), text: `closest: ${(1e3 * closest.distance_m).toFixed(1)} mm`, alert: false });
+    labels.push({ at: [0, 1, 2].map((a) => 0.5 * (min[a] + max[a])), text: closestText(closest.distance_m), alert: true, aside: true });
   }
   return labels;
+}
+
+/** How near the closest approach is. */
+function closestText(metres) {
+  const mm = Math.abs(1e3 * metres).toFixed(1);
+  return metres > 0 ? `closest: ${mm} mm` : `in collision: ${mm} mm deep`;
 }
 
 /** The view: canvas, camera, labels, buttons. */
@@ -67,18 +72,22 @@ class View {
     this.camera = new Camera();
     this.painter = Painter.on(this.canvas, world) || new Plan(this.canvas, world);
     this.painter.redraw = () => this.ask();
-    this.now = { frames: null, share: 0 };
+    this.now = { pose: null, frames: null, share: 0 };
     this.dark = matchMedia('(prefers-color-scheme: dark)');
     this.following = false;
     this.labels = world.labels.map((label) => {
       const span = document.createElement('span');
       span.textContent = label.text;
       span.classList.toggle('alert', Boolean(label.alert));
+      span.classList.toggle('aside', Boolean(label.aside));
       document.getElementById('labels').append(span);
       return { ...label, span };
     });
     steer(this.canvas, this.camera, () => this.ask(), () => this.overview());
-    for (const button of document.querySelectorAll('[data-view]')) button.addEventListener('click', () => this.press(button));
+    for (const button of document.querySelectorAll('[data-view]')) {
+      button.hidden = button.dataset.view === 'follow' && !world.rows;
+      button.addEventListener('click', () => this.press(button));
+    }
     new ResizeObserver(() => this.resize()).observe(this.canvas);
     this.dark.addEventListener('change', () => this.ask());
     addEventListener('beforeprint', () => this.draw(PALETTES.light));
@@ -96,7 +105,7 @@ class View {
     if (word === 'follow') {
       this.following = !this.following;
       button.setAttribute('aria-pressed', String(this.following));
-      if (this.following) this.lookAt(this.pose, 7 * this.world.reach);
+      if (this.following) this.lookAt(this.now.pose, 7 * this.world.reach);
       else this.overview();
     }
     this.ask();
@@ -122,8 +131,7 @@ class View {
 
   /** Shows the robot at a pose, with a share of the way behind it. */
   show(pose, joints, share) {
-    this.pose = pose;
-    this.now = { frames: shapeFrames(this.world.robot, pose, joints), share };
+    this.now = { pose, frames: shapeFrames(this.world.robot, pose, joints), share };
     if (this.following) this.camera.target = [pose[0], pose[1], 0.2];
     this.ask();
   }
@@ -149,12 +157,12 @@ class View {
   draw(palette = this.dark.matches ? PALETTES.dark : PALETTES.light) {
     this.painter.draw(this.camera, palette, this.now);
     const { clientWidth: width, clientHeight: height } = this.canvas;
-    for (const { at, span } of this.labels) {
+    for (const { at, span, aside } of this.labels) {
       const [[x, y, w]] = this.camera.project([at]);
       const inside = w > 0 && Math.abs(x) < 0.97 && Math.abs(y) < 0.95;
       span.style.visibility = inside ? 'visible' : 'hidden';
       const left = Math.min(0.5 * (1 + x) * width, width - span.offsetWidth - 4);
-      span.style.transform = `translate(${left.toFixed(1)}px, ${(0.5 * (1 - y) * height).toFixed(1)}px) translateY(-130%)`;
+      span.style.transform = `translate(${left.toFixed(1)}px, ${(0.5 * (1 - y) * height).toFixed(1)}px) translate(${aside ? '14px, -50%' : '0, -130%'})`;
     }
   }
 }
@@ -232,7 +240,7 @@ class Player {
       line.setAttribute('x2', x);
     }
     const figures = this.figures(state, data);
-    for (const { cell, key } of this.shown) cell.textContent = figures[key].replace(/-/g, '−');
+    for (const { cell, key } of this.shown) cell.textContent = figures[key].replace(/-(?=[0.]+ )/g, '').replace(/-/g, '−');
   }
 
   /** What is written below the view. */

@@ -24,7 +24,7 @@ use crate::certify::{self, Instant};
 use crate::command::CommandTable;
 use crate::map::VoxelMap;
 use crate::mission::PoseSpec;
-use crate::robot::RobotModel;
+use crate::robot::{Convex, RobotModel};
 
 use html::{escape, fill, in_script};
 pub use still::svg;
@@ -33,6 +33,9 @@ pub use still::svg;
 const REACH: f64 = 0.5;
 /// Instants at which the clearance is measured, at most about.
 const INSTANTS: usize = 600;
+/// Corners of shapes looked at over all instants, about: robots of many fine meshes are measured more seldom, but never less than a
+/// sixth as often.
+const CORNERS: usize = 600 * 600;
 
 /// The script, in the order in which its parts rest on each other. One function around all of them keeps the page's names to itself.
 const SCRIPT: [&str; 7] = [
@@ -82,7 +85,12 @@ impl PageInputs<'_> {
         let first = &table.rows[0];
         let required = self.report.certificate.as_ref().and_then(|c| c.clearance_required_m).unwrap_or(0.0);
         let reach = REACH.max(4.0 * required);
-        let every = table.rows.len().div_ceil(INSTANTS);
+        let corners = |shape: &crate::robot::Shape| match &shape.convex {
+            Convex::Hull { vertices } => vertices.len(),
+            _ => 8,
+        };
+        let corners: usize = robot.shapes.iter().map(corners).sum();
+        let every = table.rows.len().div_ceil((CORNERS / corners.max(1)).clamp(INSTANTS / 6, INSTANTS));
         let start = (first.pose, first.joint_positions.as_slice());
         let instants = certify::distances(table, robot, map, start, every, reach);
         Some(Distances { instants, step: table.sampling_time * every as f64, reach })
@@ -169,10 +177,19 @@ fn at_least_mm(metres: f64) -> String {
     format!("{} mm", figure((1e5 * metres + 1e-7).floor() / 100.0))
 }
 
-/// A length in millimetres with its unit.
+/// A length in millimetres with its unit, to a micrometre.
 fn mm(metres: f64) -> String {
     let value = 1e3 * metres;
-    if value != 0.0 && value.abs() < 0.001 { "< 0.001 mm".into() } else { format!("{} mm", figure(value)) }
+    if value != 0.0 && value.abs() < 0.001 {
+        "< 0.001 mm".into()
+    } else {
+        format!("{} mm", figure((1e3 * value).round() / 1e3))
+    }
+}
+
+/// A share in percent, rounded up: what is used of a limit is never said to be less. To a tenth.
+fn percent(share: f64) -> String {
+    format!("{:.1} %", (1e3 * share - 1e-6).ceil() / 10.0)
 }
 
 /// An angle in degrees with its sign.

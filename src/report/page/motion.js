@@ -71,15 +71,33 @@ function footprint(robot, pose, joints) {
   return robot.shapes.flatMap((shape, s) => (frames[s] ? [outlineOf(shape.points.map((p) => carry(frames[s], p)))] : []));
 }
 
-/** Times along a motion, the first and the last among them, between which the robot moves by about `reach` (m; a radian counts as `lever` m). */
+/** How far the robot moves from the row before, m; a radian counts as `lever` m. */
+function moveTo(rows, k, lever) {
+  const turned = rows.joints.reduce((sum, joint) => sum + Math.abs(joint[k] - joint[k - 1]), Math.abs(rows.yaw[k] - rows.yaw[k - 1]));
+  return Math.hypot(rows.x[k] - rows.x[k - 1], rows.y[k] - rows.y[k - 1]) + lever * turned;
+}
+
+/** How far the robot moves in all. */
+function wayLength(rows, lever) {
+  let way = 0;
+  for (let k = 1; k < rows.count; k += 1) way += moveTo(rows, k, lever);
+  return way;
+}
+
+/** Times along a motion, the first and the last among them, between which the robot moves by `reach`. */
 function timesAlong(rows, reach, lever) {
   const times = [0];
   let way = 0;
   for (let k = 1; k < rows.count; k += 1) {
-    way += Math.hypot(rows.x[k] - rows.x[k - 1], rows.y[k] - rows.y[k - 1]);
-    way += lever * Math.abs(rows.yaw[k] - rows.yaw[k - 1]);
-    for (const joint of rows.joints) way += lever * Math.abs(joint[k] - joint[k - 1]);
-    if (way >= reach) { times.push(k * rows.step); way = 0; }
+    const move = moveTo(rows, k, lever);
+    // Several within one row where it is fast.
+    let rest = move;
+    while (way + rest >= reach) {
+      rest -= reach - way;
+      way = 0;
+      times.push((k - rest / move) * rows.step);
+    }
+    way += rest;
   }
   if (times[times.length - 1] < rows.end) times.push(rows.end);
   return times;

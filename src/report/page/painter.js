@@ -21,6 +21,11 @@ function rgba(hex, alpha = 1) {
   return [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255).concat(alpha);
 }
 
+/** Whether two poses would be drawn over each other. */
+function near(a, b, reach) {
+  return b !== null && Math.hypot(a[0] - b[0], a[1] - b[1]) < 0.6 * reach;
+}
+
 /** Draws a world (see `readWorld`) with WebGL; `Painter.on` returns null where there is none. */
 class Painter {
   static on(canvas, world) {
@@ -156,11 +161,14 @@ class Painter {
     if (now.frames) this.once(() => this.robot(now.frames, palette, { opacity: 0.4, edges: 0 }));
     gl.depthFunc(gl.LEQUAL);
 
-    for (const frames of world.ghosts) {
+    if (now.frames) this.robot(now.frames, palette);
+    for (const { pose, frames } of world.ghosts) {
+      if (near(pose, now.pose, world.reach)) continue;
       this.once(() => this.robot(frames, palette, { opacity: 0.1, edges: 0 }));
       this.robot(frames, palette, { opacity: 0, edges: 0.32 });
     }
     for (const place of world.places) {
+      if (near(place.pose, now.pose, world.reach)) continue;
       if (place.solid) {
         this.robot(place.frames, palette, { link: place.link });
       } else {
@@ -168,7 +176,6 @@ class Painter {
         this.robot(place.frames, palette, { opacity: 0, edges: 0.9, link: place.link });
       }
     }
-    if (now.frames) this.robot(now.frames, palette);
     gl.depthFunc(gl.ALWAYS);
     this.put(mesh.cell, rgba(palette.alert));
     mesh.rings.forEach((ring) => this.put(ring, rgba(palette.alert)));

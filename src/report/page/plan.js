@@ -52,7 +52,7 @@ class Plan {
       stroke(world.way.slice(k), palette.ahead, 2);
       stroke(world.way.slice(0, k + 1), palette.driven, 2.5);
     }
-    world.ghosts.forEach((frames) => shadow(frames, 0.05));
+    world.ghosts.forEach(({ frames }) => shadow(frames, 0.05));
     world.places.forEach((place) => shadow(place.frames, 0.25, place.link));
     if (now.frames) shadow(now.frames, 0.85);
     for (const { at: p, radius } of world.rings) {

@@ -9,6 +9,9 @@ use crate::report::schema::{FAR, Report};
 /// The same chart for wide screens and for narrow ones, as letters must not shrink with it: widths and height, px.
 const STRIP: [f64; 3] = [1120.0, 390.0, 165.0];
 
+/// Smaller errors are drawn as this, mm: rounding.
+const LEAST: f64 = 1e-6;
+
 /// Distance from obstacles over time, mm, with what is required and what is proven.
 pub(super) fn clearance(inputs: &PageInputs<'_>, distances: &Distances) -> String {
     let reach = 1e3 * distances.reach;
@@ -59,6 +62,24 @@ pub(super) fn own_row(report: &Report) -> Option<&PathErrorRow> {
     rows().find(|row| row.sampling == commands.sampling).or_else(|| rows().next())
 }
 
+/// Clearance proven of the commands of each sampling time; nothing where none is near.
+fn clearances(report: &Report, samplings: &[&str]) -> Option<Chart> {
+    let proven = |row: &PathErrorRow| row.clearance_min_m.filter(|v| *v < FAR);
+    if !report.path_error.iter().any(|row| proven(row).is_some()) {
+        return None;
+    }
+    let mut chart = Chart { x_spread: Spread::Logarithmic, ..Chart::new("Clearance proven", "sampling time s", "mm") };
+    for sampling in samplings {
+        let own = report.path_error.iter().filter(|row| row.sampling == *sampling);
+        let mut points: Vec<[f64; 2]> = own.filter_map(|row| Some([row.sampling_time_s, 1e3 * proven(row)?])).collect();
+        points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        chart = chart.line(*sampling, points, Join::Dots);
+    }
+    let required = report.certificate.as_ref().and_then(|c| c.clearance_required_m);
+    let chart = required.map_or_else(|| chart.clone(), |v| chart.clone().level("required", 1e3 * v));
+    Some(chart.level("", 0.0))
+}
+
 /// Path error against sampling time: charts and a table.
 pub(super) fn path_error(report: &Report) -> String {
     let rows = &report.path_error;
@@ -71,18 +92,20 @@ pub(super) fn path_error(report: &Report) -> String {
             samplings.push(&row.sampling);
         }
     }
+    let drawn = |chart: &Chart, id: &str| {
+        format!("<figure>{}</figure>\n", Small { width: 400.0, height: 230.0, id, over_time: false }.draw(chart))
+    };
     let chart = |title: &str, error: fn(&PathErrorRow) -> f64, id: &str| {
         let empty = Chart::new(title, "sampling time s", "mm");
         let mut chart = Chart { x_spread: Spread::Logarithmic, y_spread: Spread::Logarithmic, ..empty };
         for sampling in &samplings {
             let own = rows.iter().filter(|row| row.sampling == *sampling);
-            // What is not seen on this axis, an error of nothing, has its place at a picometre.
             let mut points: Vec<[f64; 2]> =
-                own.map(|row| [row.sampling_time_s, (error(row) * 1e3).max(1e-9)]).collect();
+                own.map(|row| [row.sampling_time_s, (error(row) * 1e3).max(LEAST)]).collect();
             points.sort_by(|a, b| a[0].total_cmp(&b[0]));
             chart = chart.line(*sampling, points, Join::Dots);
         }
-        format!("<figure>{}</figure>\n", Small { width: 400.0, height: 230.0, id, over_time: false }.draw(&chart))
+        drawn(&chart, id)
     };
     let own = own_row(report);
     let head = [
@@ -115,10 +138,12 @@ pub(super) fn path_error(report: &Report) -> String {
         ]
     };
     let body = format!(
-        "<p>How far a robot that holds each command leaves the planned path, by how long it holds them. Both axes are logarithmic.</p>\n\
-         <div class=\"charts\">\n{}{}</div>\n<details><summary>All figures</summary>\n{}</details>\n",
+        "<p>How far a robot that holds each command leaves the planned path, by how long it holds them. Axes are \
+         logarithmic; errors below a nanometre are drawn there.</p>\n\
+         <div class=\"charts\">\n{}{}{}</div>\n<details><summary>All figures</summary>\n{}</details>\n",
         chart("Largest path error", |row| row.lateral_max_m, "errormax"),
         chart("Error at the end", |row| row.end_point_m, "errorend"),
+        clearances(report, &samplings).map_or(String::new(), |chart| drawn(&chart, "errorclear")),
         html::table("Path error against the sampling time", &head, &rows.iter().map(cells).collect::<Vec<_>>()),
     );
     html::section("path-error", "Path error", &body)

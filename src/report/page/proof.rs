@@ -25,9 +25,9 @@ pub(super) fn limits(inputs: &PageInputs<'_>, actuators: &[Actuator]) -> String 
             vec![
                 html::text(&row.actuator.replace('_', " ")),
                 html::text(&row.quantity),
+                used(row),
                 html::number(row.peak.map_or("–".into(), figure)),
                 html::number(row.limit.map_or("none given".into(), |limit| format!("{}{unit}", figure(limit)))),
-                used(row),
                 Cell { html: peak.map_or("–".into(), |[time, _]| instant(time.min(table.duration()))), number: true },
                 html::number(place.map_or("–".into(), |p| format!("{:.2}, {:.2}", p.x, p.y).replace('-', "−"))),
             ]
@@ -36,9 +36,9 @@ pub(super) fn limits(inputs: &PageInputs<'_>, actuators: &[Actuator]) -> String 
     let head = [
         ("Actuator", false),
         ("Quantity", false),
+        ("Used", false),
         ("Peak", true),
         ("Limit", true),
-        ("Used", false),
         ("At", true),
         ("Place x, y m", true),
     ];
@@ -60,10 +60,10 @@ fn used(row: &LimitPart) -> Cell {
     let html = match (row.peak, row.limit.filter(|limit| *limit > 0.0)) {
         (Some(peak), Some(limit)) => {
             let share = peak / limit;
-            let percent = (1e3 * share - 1e-6).ceil() / 10.0;
+            let percent = super::percent(share);
             let class = if share > 1.0 + 1e-9 { " over" } else { "" };
             format!(
-                "<span class=\"share{class}\" style=\"--share:{:.3}\"><span></span></span> <span class=\"percent\">{percent:.1} %</span>",
+                "<span class=\"share{class}\" style=\"--share:{:.3}\"><span></span></span> <span class=\"percent\">{percent}</span>",
                 share.min(1.0)
             )
         }

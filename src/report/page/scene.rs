@@ -17,8 +17,13 @@ use crate::robot::RobotModel;
 
 /// Boxes drawn of a map at most; of more, the map is drawn in larger cells.
 pub(super) const MOST_BOXES: usize = 24_000;
-/// Rows given to the page at most; of more, every so many.
-pub(super) const MOST_ROWS: usize = 6_000;
+/// Numbers of all rows given to the page at most; of more, every so many rows.
+const MOST_NUMBERS: usize = 50_000;
+
+/// Every how many rows one is given to the page.
+pub(super) fn stride(table: &CommandTable) -> usize {
+    (table.rows.len() * (5 + table.joints.len())).div_ceil(MOST_NUMBERS).max(1)
+}
 
 /// Everything that is drawn. Lengths in m, angles in rad, times in s, but where `scale` says otherwise.
 #[derive(Debug, Serialize)]
@@ -131,7 +136,7 @@ impl Robot {
             link: s.link.clone(),
             body: s.body,
             pose: pose(&s.pose),
-            solid: Solid::of(&s.convex),
+            solid: Solid::of(&s.convex, robot.shapes.len()),
         };
         Self {
             bodies: robot.bodies.iter().map(body).collect(),
@@ -164,7 +169,7 @@ impl Rows {
     pub(super) fn of(table: &CommandTable) -> Self {
         let scale = 1e4;
         let states = motion::states(table);
-        let every = table.rows.len().div_ceil(MOST_ROWS).max(1);
+        let every = stride(table);
         let list = |value: &dyn Fn(usize) -> f64| {
             let values = (0..states.len()).step_by(every).map(|k| (value(k) * scale).round() as i64);
             let mut before = 0;

@@ -1,9 +1,9 @@
 //! Charts for a place within a web page: few lines of frame, values beside the axis, names above the drawing.
 
-use super::Chart;
 use super::chart::{RING, paint};
 use super::scale::Spread;
 use super::svg::{Anchor, Area, COLOURS, FAINT, GREY, INK, Lettering, Paint, Svg, text_width};
+use super::{Chart, Level};
 
 /// Room for the values of the vertical axis, px.
 const LEFT: f64 = 44.0;
@@ -15,6 +15,8 @@ const LINE: f64 = 18.0;
 const BOTTOM: f64 = 22.0;
 /// Of values and names, px.
 const SMALL: f64 = 11.5;
+/// Of lines, px.
+const STROKE: f64 = 1.4;
 /// Of the title, px.
 const HEADING: f64 = 13.0;
 
@@ -33,7 +35,7 @@ pub struct Small<'a> {
 
 impl Small<'_> {
     /// The chart as an element of a page. Its title takes the vertical axis' name after a comma; names of lines are written below it, in
-    /// their colours.
+    /// their colours. The axis shows levels without a name too, but no line is drawn for them.
     pub fn draw(&self, chart: &Chart) -> String {
         let title = format!("{}, {}", chart.title, chart.y_label);
         let title = title.trim_end_matches([' ', ',']);
@@ -50,7 +52,7 @@ impl Small<'_> {
         for (value, text) in y.ticks((inner.height / 34.0).max(2.0) as usize) {
             let at = inner.bottom() - y.share(value) * inner.height;
             svg.line([inner.x, at], [inner.right(), at], &Paint::line(FAINT, 1.0));
-            svg.text([inner.x - 6.0, at + 4.0], &text, &small.anchored(Anchor::End));
+            svg.text([inner.x - 6.0, at + 4.0], &text.replace('-', "−"), &small.anchored(Anchor::End));
         }
         let ticks = x.ticks((inner.width / 70.0) as usize);
         let unit = chart.x_label.rsplit(' ').next().unwrap_or_default();
@@ -64,22 +66,26 @@ impl Small<'_> {
             let at = at.min(self.width - half);
             svg.text([at, inner.bottom() + 15.0], &text, &small.anchored(Anchor::Middle));
         }
+        let levels = || chart.levels.iter().filter(|level| !level.name.is_empty());
+        let height = |level: &Level| place([x.low, level.value])[1];
+        for level in levels() {
+            svg.line([inner.x, height(level)], [inner.right(), height(level)], &Paint::line(INK, 1.0).dashed("4 3"));
+        }
+        svg.within(inner.inside(-2.0, -2.0, -2.0, -2.0), |svg| {
+            for (i, series) in chart.series.iter().enumerate() {
+                series.draw(svg, &Paint { width: STROKE, ..paint(i) }, place);
+            }
+        });
         let mut taken: Vec<f64> = Vec::new();
-        for level in &chart.levels {
-            let at = place([x.low, level.value])[1];
-            svg.line([inner.x, at], [inner.right(), at], &Paint::line(INK, 1.0).dashed("4 3"));
-            if !level.name.is_empty() && taken.iter().all(|t| (t - at).abs() > SMALL) {
+        for level in levels() {
+            let at = height(level);
+            if taken.iter().all(|t| (t - at).abs() > SMALL) {
                 taken.push(at);
                 let above = if at - SMALL < inner.y { at + SMALL } else { at - 4.0 };
                 let look = Lettering { rimmed: true, ..Lettering::of(SMALL).anchored(Anchor::End) };
                 svg.text([inner.right(), above], &level.name, &look);
             }
         }
-        svg.within(inner.inside(-2.0, -2.0, -2.0, -2.0), |svg| {
-            for (i, series) in chart.series.iter().enumerate() {
-                series.draw(svg, &paint(i), place);
-            }
-        });
         if self.over_time {
             svg.cursor(inner, [x.low, x.high]);
         }
