@@ -141,13 +141,17 @@ fn write(
     read: f64,
 ) -> Result<Vec<String>, Diagnostics> {
     let report = outcome.report.to_json();
-    let timings = timings_json(&outcome.timings, read);
+    let started = std::time::Instant::now();
+    let page = page(args.report, name, inputs, outcome);
+    let drawn = ("page", started.elapsed().as_secs_f64() * 1e3);
+    let timings: Vec<_> = outcome.timings.iter().copied().chain([drawn]).collect();
+    let timings = timings_json(&timings, read);
     let mut files: Vec<(&str, Vec<u8>)> = Vec::new();
     if let Some(compiled) = &outcome.compiled {
         files.extend(command_files(args, name, inputs, disk, compiled, &outcome.report.path_error, &report)?);
     }
     files.push(("report.json", report.into_bytes()));
-    files.extend(page(args.report, name, inputs, outcome));
+    files.extend(page);
     files.push(("timings.json", timings.into_bytes()));
     let borrowed: Vec<(&str, &[u8])> = files.iter().map(|(name, bytes)| (*name, bytes.as_slice())).collect();
     if outcome.compiled.is_some() {

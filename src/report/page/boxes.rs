@@ -40,6 +40,11 @@ fn merged(map: &VoxelMap, factor: usize, most: usize) -> Option<Vec<[u16; 6]>> {
         // Boxes of the slice that reach the column before, by height.
         let mut open: Vec<usize> = Vec::new();
         for j in 0..dims[1] {
+            // Most columns are free.
+            if factor == 1 && map.column(i, j).iter().all(|word| *word == 0) {
+                open.clear();
+                continue;
+            }
             let mut now = Vec::new();
             for (low, high) in runs(map, [i, j], factor, &mut column) {
                 let goes_on = open.iter().copied().find(|at| slice[*at][2..] == [low, high]);

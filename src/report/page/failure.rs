@@ -65,7 +65,8 @@ pub(super) fn key_figures(failure: &Failure) -> Vec<(&'static str, String, Strin
     if let Some(v) = value("closest_to_goal_m") {
         out.push(("Got as close as", metres(v), "to the goal".into()));
     }
-    if let (Some(width), Some(needed)) = (value("narrowest_gap_m"), value("least_gap_needed_m")) {
+    let gap = value("narrowest_gap_m").zip(value("least_gap_needed_m"));
+    if let Some((width, needed)) = gap.filter(|(width, needed)| width < needed) {
         out.push(("Narrowest gap", metres(width), format!("the base needs {}", metres(needed))));
     }
     if let Some(v) = value("expanded") {
@@ -82,22 +83,27 @@ pub(super) fn section(inputs: &PageInputs<'_>) -> String {
         escape(stage(failure)),
         escape(&failure.reason)
     );
+    body += &format!("<p class=\"note\">Code <code>{}</code></p>\n", escape(&failure.code));
+    html::section("failure", "Why it failed", &body)
+}
+
+/// All figures of a failure; nothing for a mission that is certified.
+pub(super) fn details(inputs: &PageInputs<'_>) -> String {
+    let Some(failure) = &inputs.report.failure else { return String::new() };
+    let mut body = String::new();
     let figures = figures(&failure.numbers);
     if !figures.is_empty() {
         body += &definitions("proof", &figures);
     }
     if let Some(list) = failure.numbers.get("refusals").and_then(Value::as_array) {
         let items = list.iter().filter_map(|entry| {
-            let at = entry
-                .get("time_s")
-                .and_then(Value::as_f64)
-                .map_or(String::new(), |t| format!(" ({})", html::instant(t)));
+            let at = entry.get("time_s").and_then(Value::as_f64);
+            let at = at.map_or(String::new(), |t| format!(" ({})", html::instant(t)));
             Some(format!("<li>{}{at}</li>\n", escape(entry.get("message")?.as_str()?)))
         });
         body += &format!("<ul>\n{}</ul>\n", items.collect::<String>());
     }
-    body += &format!("<p class=\"note\">Code <code>{}</code></p>\n", escape(&failure.code));
-    html::section("failure", "Why it failed", &body)
+    if body.is_empty() { body } else { html::section("figures", "What was found", &body) }
 }
 
 /// What the stage did not find.

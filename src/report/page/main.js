@@ -161,7 +161,7 @@ class View {
       const [[x, y, w]] = this.camera.project([at]);
       const inside = w > 0 && Math.abs(x) < 0.97 && Math.abs(y) < 0.95;
       span.style.visibility = inside ? 'visible' : 'hidden';
-      const left = Math.min(0.5 * (1 + x) * width, width - span.offsetWidth - 4);
+      const left = Math.max(4, Math.min(0.5 * (1 + x) * width, width - span.offsetWidth - (aside ? 18 : 4)));
       span.style.transform = `translate(${left.toFixed(1)}px, ${(0.5 * (1 - y) * height).toFixed(1)}px) translate(${aside ? '14px, -50%' : '0, -130%'})`;
     }
   }

@@ -116,6 +116,7 @@ pub fn html(inputs: &PageInputs<'_>) -> String {
     let sections = [
         failure::section(inputs),
         header::view(inputs, distances.as_ref(), factor),
+        failure::details(inputs),
         proof::limits(inputs, &actuators),
         plots::path_error(inputs.report),
         proof::certificate(inputs),

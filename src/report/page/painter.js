@@ -121,7 +121,7 @@ class Painter {
       const hit = link !== null && this.world.robot.shapes[s].link === link;
       const hex = hit ? palette.alert : shape.moved ? palette.moved : palette.base;
       if (opacity > 0) this.put(shape.faces, rgba(hex, opacity), { model, lit: 1 });
-      if (edges > 0) this.put(shape.lines, rgba(opacity < 0.5 ? hex : palette.edge, edges), { model });
+      if (edges > 0) this.put(shape.lines, rgba(opacity < 0.5 ? hex : palette.edge, opacity < 0.5 ? edges : edges * this.crisp), { model });
     });
   }
 
@@ -139,6 +139,8 @@ class Painter {
     gl.enable(gl.POLYGON_OFFSET_FILL);
     gl.polygonOffset(1, 1);
     gl.uniformMatrix4fv(this.at.camera, false, camera.matrix());
+    // Edges of a robot a few pixels wide would be all one sees of it.
+    this.crisp = Math.min(1, (world.reach / camera.distance) * this.canvas.height / 40);
 
     gl.depthMask(false); // nothing lies below the floor, and what lies on it is drawn in order
     this.put(mesh.floor, rgba(palette.floor));
