@@ -15,7 +15,7 @@ const GHOSTS = 14; // postures drawn along the way
 /** What is drawn, in metres, from the page's data. */
 function readWorld(data) {
   const robot = readRobot(data.robot), rows = readRows(data.rows);
-  const places = data.places.map((p) => ({ ...p, frames: shapeFrames(robot, p.pose, p.joints), solid: !rows && p.kind !== 'free' && p.kind !== 'goal' }));
+  const places = data.places.map((p) => ({ ...p, frames: shapeFrames(robot, p.pose, p.joints), solid: !rows && (p.kind === 'start' || p.kind === 'stuck') }));
   const way = rows && Array.from(rows.x, (x, k) => [x, rows.y[k]]);
   const reach = Math.max(0.2, ...robot.shapes.flatMap((s) => s.points.map((p) => Math.hypot(...carry(s.frame, p).slice(0, 2)))));
   const seen = [...(way || []), ...places.map((p) => p.pose), ...(data.gap ? [data.gap.at] : [])];
@@ -33,7 +33,7 @@ function readWorld(data) {
     floor: { ...floor, step: span > 60 ? 10 : span > 25 ? 5 : 1 },
     unit: span, low, high, way,
     route: data.route.length > 1 ? data.route : null,
-    tint: rows && timesAlong(rows, Math.max(0.025, wayLength(rows, reach) / 1500), reach)
+    tint: rows && timesAlong(rows, Math.max(0.03, wayLength(rows, reach) / 700), reach)
       .flatMap((t) => { const s = stateAt(rows, t); return footprint(robot, s.pose, s.joints); }),
     ghosts: rows ? ghostTimes(rows, reach).map((t) => { const s = stateAt(rows, t); return { pose: s.pose, frames: shapeFrames(robot, s.pose, s.joints) }; }) : [],
     rings, gap, closest,

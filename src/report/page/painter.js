@@ -100,13 +100,13 @@ class Painter {
     gl.drawArrays(mesh.kind, first, count);
   }
 
-  /** Draws so that no pixel is tinted twice. */
+  /** Draws so that no pixel is tinted twice: each pixel keeps the number of the last such drawing. At most 255 a picture. */
   once(draw) {
     const { gl } = this;
-    gl.clear(gl.STENCIL_BUFFER_BIT);
+    this.drawn += 1;
     gl.enable(gl.STENCIL_TEST);
-    gl.stencilFunc(gl.EQUAL, 0, 1);
-    gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
+    gl.stencilFunc(gl.NOTEQUAL, this.drawn, 0xff);
+    gl.stencilOp(gl.KEEP, gl.KEEP, gl.REPLACE);
     gl.depthMask(false);
     draw();
     gl.depthMask(true);
@@ -131,6 +131,7 @@ class Painter {
     gl.viewport(0, 0, this.canvas.width, this.canvas.height);
     gl.clearColor(...rgba(palette.stage));
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
+    this.drawn = 0;
     gl.enable(gl.DEPTH_TEST);
     gl.enable(gl.CULL_FACE);
     gl.enable(gl.BLEND);
@@ -161,6 +162,9 @@ class Painter {
     gl.depthFunc(gl.GREATER);
     way(0.3);
     if (now.frames) this.once(() => this.robot(now.frames, palette, { opacity: 0.4, edges: 0 }));
+    for (const { solid, frames, link } of world.places) {
+      if (solid) this.once(() => this.robot(frames, palette, { opacity: 0.4, edges: 0, link }));
+    }
     gl.depthFunc(gl.LEQUAL);
 
     if (now.frames) this.robot(now.frames, palette);

@@ -8,9 +8,9 @@ class Plan {
 
   draw(camera, palette, now) {
     const { paper, world, canvas } = this;
-    const above = Object.assign(new Camera(), camera, { tilt: Math.PI / 2 - 1e-3 });
+    camera.tilt = Math.PI / 2 - 1e-3;
     const at = (p) => {
-      const [[x, y]] = above.project([[p[0], p[1], 0]]);
+      const [[x, y]] = camera.project([[p[0], p[1], 0]]);
       return [0.5 * (1 + x) * canvas.width, 0.5 * (1 - y) * canvas.height];
     };
     const line = (points, closed) => {
