@@ -95,6 +95,19 @@ pub struct Outcome {
     pub diagnostics: Option<Diagnostics>,
     /// Stage and milliseconds, in order.
     pub timings: Vec<(&'static str, f64)>,
+    /// What can be shown of the run, however it ended.
+    pub traces: Traces,
+}
+
+/// What a run leaves behind beside its figures, for pictures: as far as it got.
+#[derive(Default)]
+pub struct Traces {
+    /// Robot and map ([`compile`] only: of [`compile_in`] the caller has them).
+    pub world: Option<World>,
+    /// Places of the base on the search's path, m.
+    pub route: Vec<[f64; 2]>,
+    /// Commands that the certificate refused.
+    pub refused: Option<CommandTable>,
 }
 
 /// A certified motion.
@@ -128,10 +141,15 @@ pub const OPTIMISER_MARGINS: [f64; 3] = [0.01, 0.02, 0.04];
 struct Run<'a> {
     report: Report,
     timings: Vec<(&'static str, f64)>,
+    traces: Traces,
     progress: &'a mut dyn FnMut(&'static str),
 }
 
-impl Run<'_> {
+impl<'a> Run<'a> {
+    fn new(inputs: InputsPart, progress: &'a mut dyn FnMut(&'static str)) -> Self {
+        Self { report: Report::new(inputs), timings: Vec::new(), traces: Traces::default(), progress }
+    }
+
     /// Runs one stage and notes its time.
     fn stage<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
         (self.progress)(name);
@@ -146,12 +164,12 @@ impl Run<'_> {
     }
 
     fn end(self, result: Result<Compiled, Diagnostics>) -> Outcome {
-        let Run { mut report, timings, .. } = self;
+        let Run { mut report, timings, traces, .. } = self;
         match result {
-            Ok(compiled) => Outcome { report, compiled: Some(compiled), diagnostics: None, timings },
+            Ok(compiled) => Outcome { report, compiled: Some(compiled), diagnostics: None, timings, traces },
             Err(diagnostics) => {
                 report.fail(&diagnostics);
-                Outcome { report, compiled: None, diagnostics: Some(diagnostics), timings }
+                Outcome { report, compiled: None, diagnostics: Some(diagnostics), timings, traces }
             }
         }
     }
@@ -159,13 +177,15 @@ impl Run<'_> {
 
 /// Compiles one mission. `progress` is told the name of each stage as it begins.
 pub fn compile(inputs: &mut Inputs, options: &CompileOptions, progress: &mut dyn FnMut(&'static str)) -> Outcome {
-    let mut run = Run { report: Report::new(inputs_part(inputs)), timings: Vec::new(), progress };
+    let mut run = Run::new(inputs_part(inputs), progress);
     let result = run.stage("read", || world(inputs)).and_then(|world| {
         let trajectory = match &inputs.mission.path {
-            Some(path) => Some(given_path(&inputs.mission, path, inputs.path_csv.as_ref(), &world.robot)?),
-            None => None,
+            Some(path) => given_path(&inputs.mission, path, inputs.path_csv.as_ref(), &world.robot).map(Some),
+            None => Ok(None),
         };
-        stages(&mut run, &inputs.mission, &world, trajectory, options)
+        let result = trajectory.and_then(|trajectory| stages(&mut run, &inputs.mission, &world, trajectory, options));
+        run.traces.world = Some(world);
+        result
     });
     run.end(result)
 }
@@ -173,7 +193,8 @@ pub fn compile(inputs: &mut Inputs, options: &CompileOptions, progress: &mut dyn
 /// Compiles a mission whose robot and map are there already: the map (or a given path) is the caller's, files that the mission
 /// names are not looked at. For suites of many scenes.
 pub fn compile_in(mission: &Mission, world: &World, options: &CompileOptions) -> Outcome {
-    let mut run = Run { report: Report::new(InputsPart::default()), timings: Vec::new(), progress: &mut |_| {} };
+    let mut nobody = |_| {};
+    let mut run = Run::new(InputsPart::default(), &mut nobody);
     let result = stages(&mut run, mission, world, None, options);
     run.end(result)
 }
@@ -208,6 +229,7 @@ fn stages(
     run.report.commands = Some((&commands).into());
     run.report.judge(&certificate);
     if !certificate.holds() {
+        run.traces.refused = Some(commands);
         return Err(refused(&certificate, trajectory.source).into());
     }
     if !mission.path_error_times.is_empty() {
@@ -248,6 +270,7 @@ fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, compile: &Compil
     });
     let path = found.map_err(|error| place_search_error(mission, &error))?;
     run.report.search = Some(SearchPart::from(&path));
+    run.traces.route = path.states.iter().map(|state| [state.pose.x, state.pose.y]).collect();
     run.report.initial = Some(InitialPart { metrics: metrics::of_search(&path, robot) });
     if path.length() == 0.0 {
         return finish.certify(run, path.trajectory());

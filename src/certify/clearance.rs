@@ -408,11 +408,11 @@ impl<'a> Search<'a> {
 }
 
 /// How far a bounding box is from what lies beyond an edge, m; negative: how far it is in.
-fn beyond(edge: &Edge, bounds: &Aabb) -> f64 {
+pub(super) fn beyond(edge: &Edge, bounds: &Aabb) -> f64 {
     if edge.sign > 0.0 { edge.at - bounds.max[edge.axis] } else { bounds.min[edge.axis] - edge.at }
 }
 
 /// Distance of two axis-aligned boxes, m.
-fn gap(a: &Aabb, b: &Aabb) -> f64 {
+pub(super) fn gap(a: &Aabb, b: &Aabb) -> f64 {
     (0..3).map(|i| (a.min[i] - b.max[i]).max(b.min[i] - a.max[i]).max(0.0).powi(2)).sum::<f64>().sqrt()
 }

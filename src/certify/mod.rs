@@ -8,12 +8,14 @@ mod limits;
 mod motion;
 mod obstacles;
 mod rollout;
+mod series;
 mod simplex;
 mod table;
 #[cfg(test)]
 mod tests;
 
 use rollout::Rollout;
+pub use series::{Instant, distances};
 
 use crate::command::CommandTable;
 use crate::geom::{Aabb, Pose2};

@@ -10,14 +10,15 @@ use crate::emit::csv::{self, CsvHeader};
 use crate::emit::json;
 use crate::emit::mcap::{self, McapInputs};
 use crate::pipeline::{self, CompileOptions, Compiled, Inputs, Outcome};
+use crate::report::page::{self, PageInputs};
 use crate::report::{PathErrorRow, summary};
 
 /// Compile one mission into certified command files.
 ///
-/// Writes commands.csv, commands.mcap, path_error.csv, report.json, commands.d and timings.json into DIR/<mission's name>/ (--format
-/// chooses the command files), all or none, and prints a summary.
+/// Writes commands.csv, commands.mcap, path_error.csv, report.json, report.html, commands.d and timings.json into DIR/<mission's
+/// name>/ (--format chooses the command files), all or none, and prints a summary.
 ///
-/// Exit 0: certified. 1: no trajectory or no certificate; report.json says why. 2: bad input or usage. After 1 and 2 no command file
+/// Exit 0: certified. 1: no trajectory or no certificate; report.json and report.html say why. 2: bad input or usage. After 1 and 2 no command file
 /// of this mission is left, not even an older one.
 #[derive(Debug, clap::Args)]
 pub struct CompileArgs {
@@ -33,6 +34,9 @@ pub struct CompileArgs {
     /// Command files to write, separated by commas.
     #[arg(long, value_name = "FORMAT", value_delimiter = ',', default_value = "csv,mcap")]
     format: Vec<Format>,
+    /// The report for people to write beside report.json, also of a mission that fails.
+    #[arg(long, value_name = "KIND", default_value = "html")]
+    report: ReportKind,
     /// Print report.json on stdout instead of the summary.
     #[arg(long)]
     json: bool,
@@ -59,6 +63,17 @@ impl Format {
             Self::Trajectory => "trajectory.json",
         }
     }
+}
+
+/// A report to look at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum ReportKind {
+    /// report.html: one page that opens offline, with a 3-D view
+    Html,
+    /// report.svg: one static picture
+    Svg,
+    /// report.json alone
+    None,
 }
 
 /// A sampling time on the command line.
@@ -142,12 +157,17 @@ fn write(
     read: f64,
 ) -> Result<Vec<String>, Diagnostics> {
     let report = outcome.report.to_json();
-    let timings = timings_json(&outcome.timings, read);
+    let started = std::time::Instant::now();
+    let page = page(args.report, name, inputs, outcome);
+    let drawn = ("page", started.elapsed().as_secs_f64() * 1e3);
+    let timings: Vec<_> = outcome.timings.iter().copied().chain([drawn]).collect();
+    let timings = timings_json(&timings, read);
     let mut files: Vec<(&str, Vec<u8>)> = Vec::new();
     if let Some(compiled) = &outcome.compiled {
         files.extend(command_files(args, name, inputs, disk, compiled, &outcome.report.path_error, &report)?);
     }
     files.push(("report.json", report.into_bytes()));
+    files.extend(page);
     files.push(("timings.json", timings.into_bytes()));
     let borrowed: Vec<(&str, &[u8])> = files.iter().map(|(name, bytes)| (*name, bytes.as_slice())).collect();
     if outcome.compiled.is_some() {
@@ -156,6 +176,25 @@ fn write(
         output::publish_failure(&args.out, name, &borrowed)?;
     }
     Ok(files.iter().map(|(name, _)| (*name).to_owned()).collect())
+}
+
+/// The report for people.
+fn page(kind: ReportKind, name: &str, inputs: &Inputs, outcome: &Outcome) -> Option<(&'static str, Vec<u8>)> {
+    let (world, mission) = (outcome.traces.world.as_ref(), &inputs.mission);
+    let page = PageInputs {
+        mission: name,
+        report: &outcome.report,
+        robot: world.map(|w| &w.robot),
+        map: world.and_then(|w| w.map.as_ref()),
+        commands: outcome.compiled.as_ref().map(|c| &c.commands).or(outcome.traces.refused.as_ref()),
+        ends: [mission.start.as_ref(), mission.goal.as_ref()],
+        route: &outcome.traces.route,
+    };
+    match kind {
+        ReportKind::Html => Some(("report.html", page::html(&page).into_bytes())),
+        ReportKind::Svg => Some(("report.svg", page::svg(&page).into_bytes())),
+        ReportKind::None => None,
+    }
 }
 
 fn command_files(

@@ -14,7 +14,7 @@ use crate::diag::{Describe, Diagnostic, Diagnostics};
 pub use depfile::{depfile, spelled};
 
 /// Every file that this program writes into an output folder, command files first.
-pub const FILES: [&str; 8] = [
+pub const FILES: [&str; 9] = [
     "commands.csv",
     "commands.mcap",
     "trajectory.json",
@@ -22,6 +22,7 @@ pub const FILES: [&str; 8] = [
     "path_error.csv",
     "report.json",
     "report.html",
+    "report.svg",
     "timings.json",
 ];
 

@@ -3,6 +3,7 @@
 mod build;
 pub mod metrics;
 pub mod names;
+pub mod page;
 pub mod path_error;
 pub mod plot;
 pub mod schema;

@@ -32,6 +32,14 @@ pub fn extreme_points(points: &[[f64; 3]]) -> Vec<[f64; 3]> {
     distinct
 }
 
+/// The triangles of the hull of `points`, by index, counter-clockwise as seen from outside; `None` where the points have no volume
+/// or rounding broke the surface.
+pub fn triangles(points: &[[f64; 3]]) -> Option<Vec<[usize; 3]>> {
+    let cloud: Vec<Vector3<f64>> = points.iter().map(|p| Vector3::from(*p)).collect();
+    let faces = FLATNESS.iter().find_map(|flatness| Quickhull::run(&cloud, *flatness))?;
+    Some(faces.iter().map(|face| face.corners).collect())
+}
+
 /// A triangle of the hull; seen from outside its corners run counter-clockwise.
 struct Face {
     corners: [usize; 3],
@@ -245,6 +253,19 @@ mod tests {
         assert_eq!(extreme_points(&[[1.0, -0.0, 0.0], [1.0, 0.0, 0.0]]), [[1.0, 0.0, 0.0]]);
         assert_eq!(extreme_points(&[]), Vec::<[f64; 3]>::new());
         assert_eq!(extreme_points(&[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]).len(), 3);
+    }
+
+    #[test]
+    fn the_triangles_of_a_cube_close_around_its_volume() {
+        let points = lattice(2, [2.0, 3.0, 5.0]);
+        let triangles = triangles(&points).expect("a volume");
+        assert_eq!(triangles.len(), 12);
+        let volume = |[a, b, c]: [usize; 3]| {
+            let [a, b, c] = [a, b, c].map(|i| Vector3::from(points[i]));
+            a.dot(&b.cross(&c)) / 6.0
+        };
+        assert!((triangles.into_iter().map(volume).sum::<f64>() - 30.0).abs() < 1e-12);
+        assert_eq!(super::triangles(&lattice(3, [1.0, 1.0, 0.0])), None);
     }
 
     #[test]

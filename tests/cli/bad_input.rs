@@ -21,7 +21,7 @@ pub fn spoiled_with(name: &str, code: i32, args: &[&str], edit: impl FnOnce(&San
     assert_eq!(run.code, code, "{name}: stdout:\n{}\nstderr:\n{}", run.stdout, run.stderr);
     let left = sandbox.list("out/a");
     if code == 1 {
-        assert_eq!(left, ["report.json", "timings.json"], "{name}");
+        assert_eq!(left, ["report.html", "report.json", "timings.json"], "{name}");
         let report: Value = serde_json::from_slice(&sandbox.read("out/a/report.json")).expect("JSON");
         assert_eq!(report["status"], "failed", "{name}");
         assert!(!report["failure"]["reason"].as_str().expect("a reason").is_empty(), "{name}");

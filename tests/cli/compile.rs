@@ -5,8 +5,8 @@ use serde_json::Value;
 use super::sandbox::{Sandbox, golden, repository};
 
 const MISSIONS: [&str; 7] = ["first", "c_curve", "s_curve", "arbitrary", "barn_29", "depot", "levine"];
-const FILES: [&str; 6] =
-    ["commands.csv", "commands.d", "commands.mcap", "path_error.csv", "report.json", "timings.json"];
+const FILES: [&str; 7] =
+    ["commands.csv", "commands.d", "commands.mcap", "path_error.csv", "report.html", "report.json", "timings.json"];
 
 fn mission(name: &str) -> String {
     repository().join(format!("missions/{name}.yaml")).display().to_string()
@@ -24,7 +24,7 @@ fn compiles(name: &str) {
         assert!(sandbox.exists(&format!("{folder}/{file}")), "{file}");
     }
     for name in sandbox.list(&folder) {
-        assert!(FILES.contains(&name.as_str()) || name == "report.html", "{name}");
+        assert!(FILES.contains(&name.as_str()), "{name}");
     }
     assert_eq!(sandbox.list("out"), [name], "nothing is left beside");
     let report: Value = serde_json::from_slice(&sandbox.read(&format!("{folder}/report.json"))).expect("JSON");
@@ -181,7 +181,23 @@ fn files_of_others_in_the_output_folder_stay() {
     assert_eq!(sandbox.text("out/a/notes.txt"), "mine");
     sandbox.edit("missions/a.yaml", "x_m: 3.4", "x_m: 34");
     sandbox.run(&["compile", "missions/a.yaml"]).expect(1);
-    assert_eq!(sandbox.list("out/a"), ["notes.txt", "report.json", "timings.json"]);
+    assert_eq!(sandbox.list("out/a"), ["notes.txt", "report.html", "report.json", "timings.json"]);
+}
+
+#[test]
+fn the_report_to_look_at_is_a_page_a_picture_or_none() {
+    let sandbox = Sandbox::new();
+    for (kind, written, gone) in [("svg", "report.svg", "report.html"), ("html", "report.html", "report.svg")] {
+        for (goal, code) in [("x_m: 3.4", 0), ("x_m: 2.0", 1)] {
+            sandbox.edit("missions/a.yaml", "goal: {x_m: 3.4", &format!("goal: {{{goal}"));
+            sandbox.run(&["compile", "missions/a.yaml", "--report", kind]).expect(code);
+            assert!(sandbox.exists(&format!("out/a/{written}")) && !sandbox.exists(&format!("out/a/{gone}")), "{kind}");
+            sandbox.edit("missions/a.yaml", &format!("goal: {{{goal}"), "goal: {x_m: 3.4");
+        }
+    }
+    sandbox.run(&["compile", "missions/a.yaml", "--report", "none"]).expect(0);
+    assert!(sandbox.exists("out/a/report.json"));
+    assert!(!sandbox.exists("out/a/report.html") && !sandbox.exists("out/a/report.svg"), "the older ones go");
 }
 
 #[test]

@@ -2,7 +2,7 @@ use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
 
 use super::robots::*;
-use crate::certify::{Certificate, RefusalKind, Task, certify};
+use crate::certify::{Certificate, RefusalKind, Task, certify, distances};
 use crate::command::CommandTable;
 use crate::geom::Pose2;
 use crate::map::VoxelMap;
@@ -23,6 +23,28 @@ fn measured(table: &CommandTable, robot: &RobotModel, map: &VoxelMap, certificat
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn distances_at_instants_are_the_true_ones(
+        robot in any_robot(), map in any_map(), (start, values, step, held) in any_motion(), reach in 0.05..1.5f64, every in 1..3usize,
+    ) {
+        let (values, held) = cut(&robot, &values, &held);
+        let (table, _) = commands(&robot, start, &values, step, &held);
+        let found = distances(&table, &robot, &map, (start, &values), every, reach);
+        let last = table.rows.len() - 1;
+        let rows: Vec<usize> = (0..last).step_by(every).chain([last]).collect();
+        prop_assert_eq!(found.len(), rows.len());
+        for (instant, row) in found.iter().zip(rows) {
+            let each = (0..robot.shapes.len()).map(|shape| distance_at(&table, &robot, &map, (row, 0.0), shape));
+            let truth = each.fold(f64::INFINITY, f64::min);
+            prop_assert_eq!(instant.time, table.time(row));
+            match instant.distance {
+                far if far == f64::INFINITY => prop_assert!(truth > reach - 1e-6, "{truth}"),
+                near if near > 1e-6 => prop_assert!((near - truth).abs() < 1e-6 && near <= reach, "{near} {truth}"),
+                overlap => prop_assert!(truth < 2e-6, "{overlap} {truth}"),
+            }
+        }
+    }
 
     #[test]
     fn the_clearance_proven_is_the_true_one(

@@ -15,6 +15,8 @@ pub(super) const BOTTOM: f64 = 38.0;
 pub(super) const SMALL: f64 = 11.0;
 /// px.
 const HEADING: f64 = 13.0;
+/// Radius of a mark, px.
+pub(super) const RING: f64 = 4.5;
 /// Dashes tell lines apart where colour is lost.
 const DASHES: [Option<&str>; 3] = [None, Some("7 3"), Some("2 2")];
 
@@ -38,6 +40,15 @@ pub struct Series {
     pub points: Vec<[f64; 2]>,
     /// Between the points.
     pub join: Join,
+}
+
+/// A point that is marked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mark {
+    /// Where.
+    pub at: [f64; 2],
+    /// The line in whose colour it is.
+    pub series: usize,
 }
 
 /// A dashed line across a chart at one value.
@@ -66,6 +77,8 @@ pub struct Chart {
     pub series: Vec<Series>,
     /// Limits and the like; the axis shows them all.
     pub levels: Vec<Level>,
+    /// Rings around points.
+    pub marks: Vec<Mark>,
 }
 
 impl Chart {
@@ -79,6 +92,7 @@ impl Chart {
             y_spread: Spread::Linear,
             series: Vec::new(),
             levels: Vec::new(),
+            marks: Vec::new(),
         }
     }
 
@@ -96,9 +110,15 @@ impl Chart {
         self
     }
 
-    /// Draws it into an area, labels included.
-    pub fn draw(&self, svg: &mut Svg, area: Area) {
-        let inner = area.inside(LEFT, TOP, RIGHT, BOTTOM);
+    /// With a ring around a point, in the colour of a line.
+    #[must_use]
+    pub fn mark(mut self, at: [f64; 2], series: usize) -> Self {
+        self.marks.push(Mark { at, series });
+        self
+    }
+
+    /// The axes.
+    pub(super) fn scales(&self) -> [Scale; 2] {
         let points = || self.series.iter().flat_map(|s| &s.points).filter(|p| p.iter().all(|v| v.is_finite()));
         let x = match self.x_spread {
             Spread::Linear => {
@@ -110,7 +130,13 @@ impl Chart {
             Spread::Logarithmic => Scale::around(points().map(|p| p[0]), Spread::Logarithmic),
         };
         let values = points().map(|p| p[1]).chain(self.levels.iter().map(|l| l.value));
-        let y = Scale::around(values, self.y_spread);
+        [x, Scale::around(values, self.y_spread)]
+    }
+
+    /// Draws it into an area, labels included.
+    pub fn draw(&self, svg: &mut Svg, area: Area) {
+        let inner = area.inside(LEFT, TOP, RIGHT, BOTTOM);
+        let [x, y] = self.scales();
         let place = |[u, v]: [f64; 2]| [inner.x + x.share(u) * inner.width, inner.bottom() - y.share(v) * inner.height];
         axes(svg, inner, [&x, &y], [&self.x_label, &self.y_label]);
         let mut taken: Vec<f64> = Vec::new();
@@ -130,6 +156,9 @@ impl Chart {
                 series.draw(svg, &paint(i), place);
             }
         });
+        for mark in &self.marks {
+            svg.circle(place(mark.at), RING, &Paint::line(COLOURS[mark.series % COLOURS.len()], 1.6));
+        }
         svg.rectangle(inner, &Paint::line(INK, 1.0));
         let look = Lettering { bold: true, ..Lettering::of(HEADING) };
         svg.text([inner.x, inner.y - 9.0], &self.title, &look);
@@ -149,24 +178,17 @@ impl Chart {
 }
 
 /// The paint of line i.
-fn paint(i: usize) -> Paint {
+pub(super) fn paint(i: usize) -> Paint {
     Paint { dash: DASHES[i % DASHES.len()], ..Paint::line(COLOURS[i % COLOURS.len()], 1.6) }
 }
 
 impl Series {
-    fn draw(&self, svg: &mut Svg, paint: &Paint, place: impl Fn([f64; 2]) -> [f64; 2]) {
-        let line: Vec<[f64; 2]> = match self.join {
-            Join::Held => {
-                let mut steps = Vec::with_capacity(2 * self.points.len());
-                for pair in self.points.windows(2) {
-                    steps.extend([pair[0], [pair[1][0], pair[0][1]]]);
-                }
-                steps.extend(self.points.last());
-                steps
-            }
-            _ => self.points.clone(),
-        };
-        let placed: Vec<[f64; 2]> = line.into_iter().map(&place).collect();
+    pub(super) fn draw(&self, svg: &mut Svg, paint: &Paint, place: impl Fn([f64; 2]) -> [f64; 2]) {
+        if self.join == Join::Held {
+            return svg.steps(&self.points.iter().copied().map(place).collect::<Vec<_>>(), paint);
+        }
+        let line = &self.points;
+        let placed: Vec<[f64; 2]> = line.iter().copied().map(&place).collect();
         if self.join == Join::Dots {
             svg.polyline(&placed, &Paint { width: 0.8, ..*paint });
             let dot = Paint::fill(paint.stroke.unwrap_or(INK));
@@ -228,15 +250,11 @@ mod tests {
     fn a_held_value_goes_on_to_the_next_point_and_turns_there() {
         let chart = Chart::new("", "", "").line("", vec![[0.0, 0.0], [1.0, 1.0], [2.0, 0.0]], Join::Held);
         let text = drawn(&chart);
-        let points = text.split("<polyline points=\"").nth(1).and_then(|t| t.split('"').next()).expect("a line");
-        let points: Vec<(f64, f64)> = points
-            .split(' ')
-            .map(|p| p.split_once(',').expect("a pair"))
-            .map(|(x, y)| (x.parse().expect("a number"), y.parse().expect("a number")))
-            .collect();
-        assert_eq!(points.len(), 5);
-        assert!(points[0].1 == points[1].1 && points[1].0 == points[2].0 && points[2].1 == points[3].1);
-        assert!(points[2].1 < points[1].1, "larger values are higher on the page");
+        let path = text.split("<path d=\"M").nth(1).and_then(|t| t.split('"').next()).expect("a line");
+        let numbers: Vec<f64> = path.split([' ', 'H', 'V']).map(|n| n.parse().expect("a number")).collect();
+        let [x0, y0, x1, y1, x2, y2, end] = numbers[..] else { panic!("{path}") };
+        assert!(x0 < x1 && x1 < x2 && y2 == y0 && end == x2, "level to the next point, there up or down: {path}");
+        assert!(y1 < y0, "larger values are higher on the page");
     }
 
     #[test]

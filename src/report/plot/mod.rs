@@ -8,12 +8,14 @@ pub mod motion;
 mod outline;
 pub mod place;
 mod scale;
+mod small;
 pub mod svg;
 mod top_view;
 
-pub use chart::{Chart, Join, Level, Series};
+pub use chart::{Chart, Join, Level, Mark, Series};
 pub use outline::top;
 pub use scale::{Scale, Spread};
+pub use small::{Small, thinned};
 pub use top_view::TopView;
 
 use svg::{Area, GREY, Lettering, Svg};

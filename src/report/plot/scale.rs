@@ -66,17 +66,22 @@ impl Scale {
                 let powers = |v: f64, round: fn(f64) -> f64| round(v.log10()) as i32;
                 let (first, last) =
                     (powers(self.low * (1.0 - 1e-9), f64::ceil), powers(self.high * (1.0 + 1e-9), f64::floor));
-                let text = |k: i32| {
-                    if k < 0 {
-                        format!("{:.*}", k.unsigned_abs() as usize, 10f64.powi(k))
-                    } else {
-                        format!("{:.0}", 10f64.powi(k))
-                    }
+                let text = |k: i32| match k {
+                    -3..0 => format!("{:.*}", k.unsigned_abs() as usize, 10f64.powi(k)),
+                    0..5 => format!("{:.0}", 10f64.powi(k)),
+                    _ => format!("10{}", raised(k)),
                 };
                 (first..=last).map(|k| (10f64.powi(k), text(k))).collect()
             }
         }
     }
+}
+
+/// A whole number in raised digits.
+fn raised(number: i32) -> String {
+    const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    let digit = |c: char| c.to_digit(10).map_or('⁻', |d| DIGITS[d as usize]);
+    number.to_string().chars().map(digit).collect()
 }
 
 /// The least of 1, 2, 5, 10, … that is not below `step`.
@@ -100,6 +105,10 @@ mod tests {
         assert_eq!(
             texts(Scale { low: 0.01, high: 100.0, spread: Spread::Logarithmic }, 5),
             ["0.01", "0.1", "1", "10", "100"]
+        );
+        assert_eq!(
+            texts(Scale { low: 1e-12, high: 1e-3, spread: Spread::Logarithmic }, 5),
+            ["10⁻¹²", "10⁻¹¹", "10⁻¹⁰", "10⁻⁹", "10⁻⁸", "10⁻⁷", "10⁻⁶", "10⁻⁵", "10⁻⁴", "0.001"]
         );
     }
 

@@ -12,6 +12,24 @@ pub const FAINT: &str = "#e4e4e4";
 /// "Color Universal Design", 2008.
 pub const COLOURS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 
+/// The page itself, and what parts a text from the drawing below it.
+const PAPER: &str = "#ffffff";
+
+/// The property of a web page's style sheet that stands for a colour of the kit, so that drawings within the page follow its light or
+/// dark palette. Colours of no role stay what they are.
+fn role(colour: &'static str) -> &'static str {
+    match colour {
+        INK => "var(--ink)",
+        GREY => "var(--muted)",
+        FAINT => "var(--rule)",
+        PAPER => "var(--paper)",
+        _ => {
+            let lines = ["var(--c1)", "var(--c2)", "var(--c3)", "var(--c4)", "var(--c5)", "var(--c6)"];
+            COLOURS.iter().position(|c| *c == colour).map_or(colour, |i| lines[i])
+        }
+    }
+}
+
 /// A rectangle of the page, px.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Area {
@@ -83,13 +101,14 @@ impl Paint {
         Self { fill: Some(colour), fill_opacity: opacity, ..self }
     }
 
-    fn attributes(&self) -> String {
-        let mut out = format!(" fill=\"{}\"", self.fill.unwrap_or("none"));
+    fn attributes(&self, inline: bool) -> String {
+        let named = |colour: &'static str| if inline { role(colour) } else { colour };
+        let mut out = format!(" fill=\"{}\"", self.fill.map_or("none", named));
         if self.fill.is_some() && self.fill_opacity < 1.0 {
             let _ = write!(out, " fill-opacity=\"{}\"", number(self.fill_opacity));
         }
         if let Some(stroke) = self.stroke {
-            let _ = write!(out, " stroke=\"{stroke}\" stroke-width=\"{}\"", number(self.width));
+            let _ = write!(out, " stroke=\"{}\" stroke-width=\"{}\"", named(stroke), number(self.width));
         }
         if let Some(dash) = self.dash {
             let _ = write!(out, " stroke-dasharray=\"{dash}\"");
@@ -148,6 +167,8 @@ impl Lettering {
 pub struct Svg {
     text: String,
     clips: usize,
+    /// Of a drawing within a web page: its name there, which keeps its parts' names apart from others'.
+    inline: Option<String>,
 }
 
 impl Svg {
@@ -160,25 +181,41 @@ impl Svg {
              <rect width=\"{w}\" height=\"{h}\" fill=\"#ffffff\"/>\n",
             escaped(title)
         );
-        Self { text, clips: 0 }
+        Self { text, clips: 0, inline: None }
+    }
+
+    /// A drawing within a web page: as wide as its place there, without a ground of its own, in the page's font, its colours the page's
+    /// properties `--ink`, `--muted`, `--rule`, `--paper`, `--c1` to `--c6`. `id` is unique in the page: letters and digits.
+    pub fn inline(width: f64, height: f64, title: &str, id: &str) -> Self {
+        let (w, h) = (number(width), number(height));
+        let text = format!("<svg viewBox=\"0 0 {w} {h}\" role=\"img\" aria-label=\"{}\">\n", escaped(title));
+        Self { text, clips: 0, inline: Some(id.to_owned()) }
+    }
+
+    fn attributes(&self, paint: &Paint) -> String {
+        paint.attributes(self.inline.is_some())
+    }
+
+    fn colour(&self, colour: &'static str) -> &'static str {
+        if self.inline.is_some() { role(colour) } else { colour }
     }
 
     /// A straight line.
     pub fn line(&mut self, from: [f64; 2], to: [f64; 2], paint: &Paint) {
         let [[x1, y1], [x2, y2]] = [from, to].map(|p| p.map(number));
-        self.push(&format!("<line x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\"{}/>", paint.attributes()));
+        self.push(&format!("<line x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\"{}/>", self.attributes(paint)));
     }
 
     /// A rectangle.
     pub fn rectangle(&mut self, area: Area, paint: &Paint) {
         let [x, y, w, h] = [area.x, area.y, area.width, area.height].map(number);
-        self.push(&format!("<rect x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\"{}/>", paint.attributes()));
+        self.push(&format!("<rect x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\"{}/>", self.attributes(paint)));
     }
 
     /// A circle.
     pub fn circle(&mut self, centre: [f64; 2], radius: f64, paint: &Paint) {
         let [x, y] = centre.map(number);
-        self.push(&format!("<circle cx=\"{x}\" cy=\"{y}\" r=\"{}\"{}/>", number(radius), paint.attributes()));
+        self.push(&format!("<circle cx=\"{x}\" cy=\"{y}\" r=\"{}\"{}/>", number(radius), self.attributes(paint)));
     }
 
     /// A line through points; not finite ones break it.
@@ -186,9 +223,43 @@ impl Svg {
         for run in points.split(|p| !p.iter().all(|v| v.is_finite())) {
             if run.len() > 1 {
                 let line = format!("<polyline points=\"{}\" stroke-linejoin=\"round\"", listed(run));
-                self.push(&format!("{line}{}/>", paint.attributes()));
+                self.push(&format!("{line}{}/>", self.attributes(paint)));
             }
         }
+    }
+
+    /// A line that holds each point's height until the next point; to a tenth of a pixel, runs of one height as one.
+    pub fn steps(&mut self, points: &[[f64; 2]], paint: &Paint) {
+        let tenth = |v: f64| number((10.0 * v).round() / 10.0);
+        let mut path = String::new();
+        for run in points.split(|p| !p.iter().all(|v| v.is_finite())).filter(|run| !run.is_empty()) {
+            let [x, y] = run[0].map(tenth);
+            let mut height = y.clone();
+            let _ = write!(path, "M{x} {y}");
+            for [x, y] in &run[1..] {
+                let (x, y) = (tenth(*x), tenth(*y));
+                if y != height {
+                    let _ = write!(path, "H{x}V{y}");
+                    height = y;
+                }
+            }
+            if let [_, .., last] = run {
+                let _ = write!(path, "H{}", tenth(last[0]));
+            }
+        }
+        if !path.is_empty() {
+            self.push(&format!("<path d=\"{path}\"{}/>", self.attributes(paint)));
+        }
+    }
+
+    /// A line that a page's script moves along an axis from `low` to `high` at the left and right edges of `area`; not seen without it.
+    pub fn cursor(&mut self, area: Area, [low, high]: [f64; 2]) {
+        let [x, right, y, bottom] = [area.x, area.right(), area.y, area.bottom()].map(number);
+        let stroke = self.colour(INK);
+        self.push(&format!(
+            "<line class=\"now\" data-axis=\"{low} {high} {x} {right}\" x1=\"{x}\" y1=\"{y}\" x2=\"{x}\" y2=\"{bottom}\" \
+             stroke=\"{stroke}\" visibility=\"hidden\"/>"
+        ));
     }
 
     /// Closed outlines as one shape; where an even number of them overlap there is a hole.
@@ -198,7 +269,7 @@ impl Svg {
             let _ = write!(path, "M{}Z", listed(points));
         }
         if !path.is_empty() {
-            self.push(&format!("<path d=\"{path}\" fill-rule=\"evenodd\"{}/>", paint.attributes()));
+            self.push(&format!("<path d=\"{path}\" fill-rule=\"evenodd\"{}/>", self.attributes(paint)));
         }
     }
 
@@ -219,16 +290,17 @@ impl Svg {
         }
         let text = escaped(text);
         if look.rimmed {
-            let rim = "fill=\"#ffffff\" stroke=\"#ffffff\" stroke-width=\"3\" stroke-linejoin=\"round\"";
+            let paper = self.colour(PAPER);
+            let rim = format!("fill=\"{paper}\" stroke=\"{paper}\" stroke-width=\"3\" stroke-linejoin=\"round\"");
             self.push(&format!("{head} {rim}>{text}</text>"));
         }
-        self.push(&format!("{head} fill=\"{}\">{text}</text>", look.colour));
+        self.push(&format!("{head} fill=\"{}\">{text}</text>", self.colour(look.colour)));
     }
 
     /// What `draw` draws, cut at an area's edges.
     pub fn within(&mut self, area: Area, draw: impl FnOnce(&mut Self)) {
         self.clips += 1;
-        let id = format!("clip{}", self.clips);
+        let id = format!("{}clip{}", self.inline.as_deref().unwrap_or_default(), self.clips);
         let [x, y, w, h] = [area.x, area.y, area.width, area.height].map(number);
         self.push(&format!(
             "<clipPath id=\"{id}\"><rect x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\"/></clipPath>\n\
@@ -301,6 +373,35 @@ mod tests {
         assert_eq!(title.as_deref(), Some("a < b & \"c\""));
         let texts: Vec<_> = tree.descendants().filter(|n| n.has_tag_name("text")).filter_map(|n| n.text()).collect();
         assert_eq!(texts, ["x <y> & 'z'\u{fffd}"; 2]);
+    }
+
+    #[test]
+    fn drawings_in_a_page_take_its_colours_and_keep_their_names_apart() {
+        let drawn = |id: &str| {
+            let mut svg = Svg::inline(9.0, 9.0, "\"one\"", id);
+            svg.within(Area { x: 0.0, y: 0.0, width: 9.0, height: 9.0 }, |svg| {
+                svg.line([0.0; 2], [9.0; 2], &Paint::line(COLOURS[1], 1.0).tinted("#123456", 0.5));
+            });
+            svg.text([1.0, 1.0], "a", &Lettering { rimmed: true, ..Lettering::of(9.0) });
+            svg.finish()
+        };
+        let page = format!("<p>{}{}</p>", drawn("a"), drawn("b"));
+        let tree = roxmltree::Document::parse(&page).expect("well-formed");
+        let ids: Vec<_> = tree.descendants().filter_map(|n| n.attribute("id")).collect();
+        assert_eq!(ids, ["aclip1", "bclip1"]);
+        let line = tree.descendants().find(|n| n.has_tag_name("line")).expect("drawn");
+        assert_eq!([line.attribute("stroke"), line.attribute("fill")], [Some("var(--c2)"), Some("#123456")]);
+        assert!(!page.contains(INK) && !page.contains("#ffffff") && page.contains("var(--ink)"));
+    }
+
+    #[test]
+    fn steps_turn_at_the_points_and_leave_out_what_is_level() {
+        let mut svg = Svg::new(9.0, 9.0, "steps");
+        svg.steps(
+            &[[0.0, 1.0], [1.0, 1.04], [2.0, 3.0], [3.0, 3.0], [f64::NAN, 0.0], [5.0, 2.0], [6.0, 2.0]],
+            &Paint::line(INK, 1.0),
+        );
+        assert!(svg.finish().contains("d=\"M0 1H2V3H3M5 2H6\""));
     }
 
     #[test]
