@@ -18,6 +18,7 @@
 //! | [`certify`] | [`certify::Certificate`] | `CommandTable`, `RobotModel`, `VoxelMap` |
 //! | [`report`] | [`report::Report`] | the nouns above |
 //! | [`emit`] | bytes | `CommandTable`, `Report` |
+//! | [`play`] | commands in real time | `CommandTable`, `RobotModel` |
 //!
 //! Above all stages are [`math`], [`geom`] and [`diag`]; below them [`pipeline`], [`eval`] (suites of scenes) and [`cli`]. Only `cli` opens files: stages take
 //! text and bytes, so a mission can be compiled from memory.
@@ -119,6 +120,7 @@ pub mod math;
 pub mod mission;
 pub mod optimize;
 pub mod pipeline;
+pub mod play;
 pub mod report;
 pub mod retime;
 pub mod robot;

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Top to bottom, as in `src/lib.rs`. A module may name itself and those before it.
-const ORDER: [&str; 19] = [
+const ORDER: [&str; 20] = [
     "math",
     "geom",
     "diag", // for everyone
@@ -19,7 +19,8 @@ const ORDER: [&str; 19] = [
     "command",
     "certify",
     "report",
-    "emit", // stages
+    "emit",
+    "play", // stages
     "pipeline",
     "eval",
     "cli",

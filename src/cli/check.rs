@@ -78,16 +78,31 @@ pub(super) fn mission_of(
     }
 }
 
+/// A command file, what it was judged against, and the verdict.
+pub(super) struct Judged {
+    pub table: CommandTable,
+    pub inputs: Inputs,
+    pub certificate: Certificate,
+    /// The inputs are not those that the file was made from.
+    pub changed: bool,
+}
+
+/// Reads a command file and proves of it what can be proven.
+pub(super) fn judge(commands: &Path, mission: Option<&Path>) -> Result<Judged, Diagnostics> {
+    let file = read_to_judge(commands)?;
+    let (mut inputs, disk) = mission_of(commands, &file.header, mission)?;
+    let mut certificate = pipeline::check(&mut inputs, &file.table)?;
+    certificate.refusals.extend(file.contradictions.iter().map(contradiction));
+    let changed = disk.hash() != file.header.inputs_blake3;
+    Ok(Judged { table: file.table, inputs, certificate, changed })
+}
+
 /// Checks.
 ///
 /// # Errors
 /// Bad input.
 pub fn check(args: &CheckArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics> {
-    let file = read_to_judge(&args.commands)?;
-    let (mut inputs, disk) = mission_of(&args.commands, &file.header, args.mission.as_deref())?;
-    let mut certificate = pipeline::check(&mut inputs, &file.table)?;
-    certificate.refusals.extend(file.contradictions.iter().map(contradiction));
-    let changed = disk.hash() != file.header.inputs_blake3;
+    let Judged { certificate, changed, .. } = judge(&args.commands, args.mission.as_deref())?;
     let text = if args.json { json(&certificate, changed) } else { readable(args, &certificate, changed) };
     terminal.print(&text);
     Ok(u8::from(!certificate.holds()))

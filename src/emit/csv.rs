@@ -11,7 +11,7 @@
 
 pub use super::csv_read::{read, read_to_judge};
 use super::number;
-use crate::command::CommandTable;
+use crate::command::{CommandRow, CommandTable};
 use crate::report::{PathErrorRow, names};
 
 /// The value of `format` in the head.
@@ -61,19 +61,29 @@ pub(super) fn joint_columns(name: &str, prismatic: bool) -> [String; 2] {
 /// values become spaces and surrounding spaces are lost.
 pub fn write(table: &CommandTable, header: &CsvHeader) -> String {
     let mut text: String = head(table, header).iter().map(|(key, value)| format!("# {key}: {value}\n")).collect();
+    text += &line(&columns(table));
+    for (k, row) in table.rows.iter().enumerate() {
+        let cells = cells(table.time(k), row, table.twist(k));
+        text += &line(&cells.into_iter().map(number).collect::<Vec<_>>());
+    }
+    text
+}
+
+/// Names of the columns of `commands.csv`.
+pub fn columns(table: &CommandTable) -> Vec<String> {
     let mut columns: Vec<String> =
         ["time_s", "wheel_left_rad_s", "wheel_right_rad_s", "v_mps", "omega_rad_s"].map(String::from).into();
     columns.extend(table.joints.iter().flat_map(|(name, prismatic)| joint_columns(name, *prismatic)));
     columns.extend(["x_m", "y_m", "yaw_rad"].map(String::from));
-    text += &line(&columns);
-    for (k, row) in table.rows.iter().enumerate() {
-        let (v, omega) = table.twist(k);
-        let mut cells = vec![table.time(k), row.wheel_left, row.wheel_right, v, omega];
-        cells.extend(row.joint_positions.iter().zip(&row.joint_velocities).flat_map(|(p, v)| [*p, *v]));
-        cells.extend([row.pose.x, row.pose.y, row.pose.yaw]);
-        text += &line(&cells.into_iter().map(number).collect::<Vec<_>>());
-    }
-    text
+    columns
+}
+
+/// The values of a row, in the order of [`columns`]. `twist`: speed (m/s) and turn rate (rad/s).
+pub fn cells(time: f64, row: &CommandRow, (v, omega): (f64, f64)) -> Vec<f64> {
+    let mut cells = vec![time, row.wheel_left, row.wheel_right, v, omega];
+    cells.extend(row.joint_positions.iter().zip(&row.joint_velocities).flat_map(|(p, v)| [*p, *v]));
+    cells.extend([row.pose.x, row.pose.y, row.pose.yaw]);
+    cells
 }
 
 /// The bytes of `path_error.csv`; a clearance that is unknown or without bound is an empty cell.
@@ -103,7 +113,7 @@ pub fn write_path_error(rows: &[PathErrorRow]) -> String {
 }
 
 /// One record; names with commas or quotes are quoted.
-fn line(cells: &[impl AsRef<[u8]>]) -> String {
+pub fn line(cells: &[impl AsRef<[u8]>]) -> String {
     let mut writer = ::csv::WriterBuilder::new().from_writer(Vec::new());
     writer.write_record(cells).expect("memory takes all bytes");
     let bytes = writer.into_inner().expect("memory takes all bytes");
