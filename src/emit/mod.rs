@@ -5,7 +5,7 @@ pub mod csv;
 mod csv_read;
 pub mod mcap;
 pub mod mcap_read;
-mod ros;
+pub(crate) mod ros;
 
 /// The shortest text that reads back as the same number; zero has no sign. `value` must be finite.
 pub fn number(value: f64) -> String {

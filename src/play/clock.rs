@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 use std::rc::Rc;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Slept in one go at most, s: how long a signal may go unseen.
 const SLICE: f64 = 0.01;
@@ -15,6 +15,11 @@ pub trait Clock {
     fn now(&self) -> f64;
     /// Waits until then; false, and early, as soon as `interrupted` says so.
     fn wait(&mut self, until: f64, interrupted: &dyn Fn() -> bool) -> bool;
+}
+
+/// Nanoseconds since 1970, for the stamps of what is sent. Never for the schedule: this clock may be set.
+pub fn wall_time() -> u64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos() as u64)
 }
 
 /// The machine's monotonic clock.

@@ -147,21 +147,3 @@ fn what_is_at_rest_stops_at_once_and_sets_off_as_planned() {
     assert_eq!(stop(&motion, rows, &limits).rows, []);
     assert_eq!(set_off(&motion, 0, &limits), Some(SetOff { rows: Vec::new(), joins: 0 }));
 }
-
-#[test]
-fn shipped_missions_stop_on_their_path_wherever_they_are_cut() {
-    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-    for (name, most) in [("first", 1e-3), ("s_curve", 0.5e-3)] {
-        let (mut inputs, _) = crate::cli::inputs::read(&root.join(format!("missions/{name}.yaml"))).expect("shipped");
-        let outcome = crate::pipeline::compile(&mut inputs, &Default::default(), &mut |_| {});
-        let compiled = outcome.compiled.expect("certified");
-        let motion = Motion::new(compiled.commands);
-        let limits = Limits::new(&compiled.robot, &motion);
-        for at in 0..motion.table().rows.len() {
-            let stop = stop(&motion, at, &limits);
-            let ratio = excess(&cut(&motion, &stop, at), &compiled.robot);
-            let (distance, _) = off_the_path(&motion, &stop);
-            assert!(ratio <= 1.0 && distance < most, "{name}, row {at}: {ratio}, {distance} m");
-        }
-    }
-}

@@ -112,6 +112,8 @@ impl Diffuser {
     pub fn frame(&mut self, at: f64, next: Option<(f64, [f64; 2])>) -> [i16; 2] {
         self.advance(at);
         for axis in 0..2 {
+            // More than a unit is no rounding but a frame that came late: making up for it would be a jump.
+            self.debt[axis] = self.debt[axis].clamp(-UNIT * FRAME_TIME, UNIT * FRAME_TIME);
             let share = next.map_or(0.0, |(from, _)| ((at + FRAME_TIME - from) / FRAME_TIME).clamp(0.0, 1.0));
             let then = next.map_or(0.0, |(_, held)| held[axis]);
             let mean = (1.0 - share) * self.held[axis] + share * then;
