@@ -162,12 +162,7 @@ fn from_within(motion: &Motion, limits: &Limits, time: f64, file_step: f64) -> R
 }
 
 fn not_begun(error: SinkError) -> Diagnostics {
-    let hint = match &error {
-        SinkError::Interrupted => None,
-        _ => Some("start the receiver first"),
-    };
-    let fault = Diagnostic::error("play/not-ready", error);
-    hint.map_or(fault.clone(), |hint| fault.hint(hint)).into()
+    Diagnostic::error("play/not-ready", error).hint("nothing was sent").into()
 }
 
 fn reason(reason: &Reason) -> String {

@@ -181,13 +181,9 @@ impl Player<'_> {
         self.sink.send(&command, at)
     }
 
+    /// Frames that are overdue follow each other at once: a receiver that counts them counts right, one that holds the last has that.
     fn frame(&mut self, at: f64) -> Result<(), SinkError> {
         self.frames += 1;
-        if let Some(step) = self.sink.frame_time() {
-            // Those that are overdue already would only come in a burst.
-            let overdue = ((self.clock.now() - self.zero) / step).floor();
-            self.frames = self.frames.max(overdue as usize);
-        }
         let next = self.next;
         let upcoming = (next < self.table.rows.len())
             .then(|| Upcoming { at: self.table.time(next), twist: self.table.twist(next) });

@@ -170,6 +170,7 @@ fn fault(error: SinkError) -> Diagnostics {
     Diagnostic::error("play/not-ready", error).into()
 }
 
+#[cfg(not(all(feature = "can", feature = "foxglove", feature = "ros2", feature = "zenoh", target_os = "linux")))]
 fn not_built(feature: &str) -> Diagnostics {
     let message = format!("this trajc was built without the sink `{feature}`");
     let hint = format!("build it with: cargo install --path . --features {feature}");

@@ -29,6 +29,8 @@ impl ServerListener for Subscribed {
 /// A server and its channels.
 pub struct Foxglove {
     server: Option<WebSocketServerHandle>,
+    /// What server and channels meet in; neither keeps it.
+    _context: Arc<Context>,
     channels: Vec<Arc<RawChannel>>,
     /// Indices of latched topics.
     latched: Vec<usize>,
@@ -61,6 +63,7 @@ impl Foxglove {
         let server = server.start_blocking().map_err(|error| not_ready(error.to_string()))?;
         Ok(Self {
             server: Some(server),
+            _context: context,
             channels,
             latched: topics.iter().enumerate().filter(|(_, topic)| topic.latched()).map(|(index, _)| index).collect(),
             awaited: awaited(topics),

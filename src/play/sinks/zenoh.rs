@@ -91,14 +91,9 @@ pub(super) fn token_end(topic: &Topic) -> String {
 }
 
 fn channel(session: &Session, domain: u16, topic: &Topic, token: String) -> ::zenoh::Result<Channel> {
-    // Commands must not wait for a link that is full: the next one is newer. What is sent once must arrive.
-    let control = if topic.depth() > 1 && !topic.name.contains("trajectory") {
-        CongestionControl::Drop
-    } else {
-        CongestionControl::Block
-    };
-    let publisher =
-        session.declare_publisher(data_key(domain, topic)).congestion_control(control).express(true).wait()?;
+    // Blocking: a link that is full for a moment must lose no command; one that is full for long makes rows late, which stops playback.
+    let publisher = session.declare_publisher(data_key(domain, topic));
+    let publisher = publisher.congestion_control(CongestionControl::Block).wait()?;
     let gid = xxhash_rust::xxh3::xxh3_128(token.as_bytes()).to_le_bytes();
     let asked = Arc::new(AtomicBool::new(false));
     let late = if topic.latched() {
