@@ -18,6 +18,7 @@
 //! | [`certify`] | [`certify::Certificate`] | `CommandTable`, `RobotModel`, `VoxelMap` |
 //! | [`report`] | [`report::Report`] | the nouns above |
 //! | [`emit`] | bytes | `CommandTable`, `Report` |
+//! | [`play`] | commands in real time | `CommandTable`, `RobotModel` |
 //!
 //! Above all stages are [`math`], [`geom`] and [`diag`]; below them [`pipeline`], [`inputs`] (reads missions and command files with
 //! all that they name), [`eval`] (suites of scenes) and [`cli`]. Only `inputs` and `cli` open files: stages take text and bytes, so
@@ -121,6 +122,7 @@ pub mod math;
 pub mod mission;
 pub mod optimize;
 pub mod pipeline;
+pub mod play;
 pub mod report;
 pub mod retime;
 pub mod robot;

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Top to bottom, as in `src/lib.rs`. A module may name itself and those before it.
-const ORDER: [&str; 20] = [
+const ORDER: [&str; 21] = [
     "math",
     "geom",
     "diag", // for everyone
@@ -19,7 +19,8 @@ const ORDER: [&str; 20] = [
     "command",
     "certify",
     "report",
-    "emit", // stages
+    "emit",
+    "play", // stages
     "pipeline",
     "inputs",
     "eval",
@@ -222,7 +223,8 @@ fn nothing_depends_on_a_hash_maps_order_or_on_chance() {
     for file in files().iter().filter(|f| !f.is_test()) {
         let code = file.without_unit_tests();
         for what in ["SystemTime", "thread_rng", "RandomState", "rand::"] {
-            assert!(!code.contains(what), "{} uses `{what}`", file.path.display());
+            let stamps = what == "SystemTime" && file.path.ends_with("play/clock.rs");
+            assert!(stamps || !code.contains(what), "{} uses `{what}`", file.path.display());
         }
         // Maps may be looked things up in, never gone through: none but these few, which were read for that.
         assert!(

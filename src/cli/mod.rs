@@ -8,6 +8,7 @@ pub mod eval;
 pub mod inspect;
 pub mod output;
 pub mod path_error;
+pub mod play;
 mod plot;
 pub mod schema;
 pub mod terminal;
@@ -40,6 +41,7 @@ enum Command {
     Compile(compile::CompileArgs),
     Check(check::CheckArgs),
     PathError(path_error::PathErrorArgs),
+    Play(play::PlayArgs),
     Inspect(inspect::InspectArgs),
     Eval(eval::EvalArgs),
     Schema(schema::SchemaArgs),
@@ -65,6 +67,7 @@ pub fn main() -> u8 {
         Command::Compile(args) => compile::compile(args, &mut terminal),
         Command::Check(args) => check::check(args, &mut terminal),
         Command::PathError(args) => path_error::path_error(args, &mut terminal),
+        Command::Play(args) => play::play(args, &mut terminal),
         Command::Inspect(args) => inspect::inspect(args, &mut terminal),
         Command::Eval(args) => eval::eval(args, &mut terminal),
         Command::Schema(args) => schema::schema(args, &mut terminal),

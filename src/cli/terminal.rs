@@ -32,6 +32,13 @@ impl Terminal {
         let _ = std::io::stdout().write_all(text.as_bytes());
     }
 
+    /// A remark on how it goes, beside the result: to stderr, unless it is to be quiet.
+    pub fn remark(&mut self, text: &str) {
+        if !self.quiet {
+            let _ = std::io::stderr().write_all(text.as_bytes());
+        }
+    }
+
     /// Diagnostics.
     pub fn complain(&mut self, diagnostics: &Diagnostics) {
         let _ = std::io::stderr().write_all(render(diagnostics, self.colour).as_bytes());

@@ -29,7 +29,7 @@ const MAP_FRAME: &str = "map";
 const SAME_FRAME: f64 = 1e-9;
 
 /// Topics, in the order of their channels.
-pub(super) mod topic {
+pub(crate) mod topic {
     pub const DESCRIPTION: &str = "/robot_description";
     pub const PLAN: &str = "/plan";
     pub const TRAJECTORY: &str = "/joint_trajectory_controller/joint_trajectory";
@@ -206,15 +206,15 @@ impl File {
 }
 
 /// Frames between the map and the URDF's root link.
-struct Frames {
+pub(crate) struct Frames {
     /// The frame whose pose in the map is commanded.
-    base: String,
+    pub(crate) base: String,
     /// The root link and its pose in `base`, where it is another frame.
     root: Option<(String, Isometry3<f64>)>,
 }
 
 impl Frames {
-    fn new(robot: &RobotModel, urdf: &str) -> Self {
+    pub(crate) fn new(robot: &RobotModel, urdf: &str) -> Self {
         let pose = &robot.base_from_root;
         let (moved, turned) = (pose.translation.vector.norm(), pose.rotation.angle());
         if moved <= SAME_FRAME && turned <= SAME_FRAME {
@@ -232,7 +232,7 @@ impl Frames {
         Self { base, root: Some((robot.root_link.clone(), *pose)) }
     }
 
-    fn transforms(&self, pose: Pose2, stamp: u64) -> Vec<u8> {
+    pub(crate) fn transforms(&self, pose: Pose2, stamp: u64) -> Vec<u8> {
         let mut w = cdr::Writer::default();
         w.length(1 + usize::from(self.root.is_some()));
         header(&mut w, stamp, MAP_FRAME);
@@ -267,15 +267,15 @@ fn heading(w: &mut cdr::Writer, yaw: f64) {
     w.f64_array(&[0.0, 0.0, sin, cos]);
 }
 
-fn description(urdf: &str) -> Vec<u8> {
+pub(crate) fn description(urdf: &str) -> Vec<u8> {
     let mut w = cdr::Writer::default();
     w.string(urdf);
     w.finish()
 }
 
-fn plan(table: &CommandTable, stamps: &[u64]) -> Vec<u8> {
+pub(crate) fn plan(table: &CommandTable, stamps: &[u64]) -> Vec<u8> {
     let mut w = cdr::Writer::default();
-    header(&mut w, START, MAP_FRAME);
+    header(&mut w, stamps.first().copied().unwrap_or(START), MAP_FRAME);
     w.length(table.rows.len());
     for (row, stamp) in table.rows.iter().zip(stamps) {
         header(&mut w, *stamp, MAP_FRAME);
@@ -290,7 +290,7 @@ fn names(w: &mut cdr::Writer, table: &CommandTable) {
     table.joints.iter().for_each(|(name, _)| w.string(name));
 }
 
-fn trajectory(table: &CommandTable, stamps: &[u64]) -> Vec<u8> {
+pub(crate) fn trajectory(table: &CommandTable, stamps: &[u64]) -> Vec<u8> {
     let mut w = cdr::Writer::default();
     header(&mut w, 0, "");
     names(&mut w, table);
@@ -299,19 +299,19 @@ fn trajectory(table: &CommandTable, stamps: &[u64]) -> Vec<u8> {
         w.f64s(&row.joint_positions);
         // No velocities, accelerations, effort.
         (0..3).for_each(|_| w.length(0));
-        time(&mut w, stamp - START);
+        time(&mut w, stamp - stamps[0]);
     }
     w.finish()
 }
 
-fn twist((v, omega): (f64, f64), frame: &str) -> Vec<u8> {
+pub(crate) fn twist((v, omega): (f64, f64), frame: &str) -> Vec<u8> {
     let mut w = cdr::Writer::default();
     header(&mut w, 0, frame);
     w.f64_array(&[v, 0.0, 0.0, 0.0, 0.0, omega]);
     w.finish()
 }
 
-fn wheel_speeds(row: &CommandRow) -> Vec<u8> {
+pub(crate) fn wheel_speeds(row: &CommandRow) -> Vec<u8> {
     let mut w = cdr::Writer::default();
     // An empty layout: no dimensions, no offset.
     w.length(0);
@@ -320,7 +320,7 @@ fn wheel_speeds(row: &CommandRow) -> Vec<u8> {
     w.finish()
 }
 
-fn joint_state(table: &CommandTable, row: &CommandRow, stamp: u64) -> Vec<u8> {
+pub(crate) fn joint_state(table: &CommandTable, row: &CommandRow, stamp: u64) -> Vec<u8> {
     let mut w = cdr::Writer::default();
     header(&mut w, stamp, "");
     names(&mut w, table);

@@ -6,7 +6,7 @@ mod csv_read;
 pub mod json;
 pub mod mcap;
 pub mod mcap_read;
-mod ros;
+pub(crate) mod ros;
 
 /// The shortest text that reads back as the same number; zero has no sign. `value` must be finite.
 pub fn number(value: f64) -> String {

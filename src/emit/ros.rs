@@ -106,6 +106,16 @@ pub const STRING: MessageType = MessageType {
 };
 
 impl MessageType {
+    /// As ROS 2 writes it: `RIHS01_` and the hash.
+    pub fn type_hash(&self) -> String {
+        format!("RIHS01_{}", self.hash)
+    }
+
+    /// Package and type, without `msg`.
+    pub fn package_and_type(&self) -> (&'static str, &'static str) {
+        self.name.split_once("/msg/").expect("every name here has it")
+    }
+
     /// The definition followed by all that it uses, as `ros2msg` schemas have it.
     pub fn definition(&self) -> String {
         let mut text = self.fields.to_string();
@@ -142,7 +152,7 @@ pub fn channel_metadata(message: &MessageType, offer: Offer) -> BTreeMap<String,
          lifespan:{infinite}  liveliness: 1\n  liveliness_lease_duration:{infinite}  \
          avoid_ros_namespace_conventions: false\n"
     );
-    let hash = format!("RIHS01_{}", message.hash);
+    let hash = message.type_hash();
     [("offered_qos_profiles".to_string(), qos), ("topic_type_hash".to_string(), hash)].into()
 }
 
