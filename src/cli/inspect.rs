@@ -48,7 +48,7 @@ pub fn inspect(args: &InspectArgs, terminal: &mut Terminal) -> Result<u8, Diagno
     let path = args.file.as_path();
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let (text, figure) = match ending.as_str() {
-        "urdf" => of_robot(path)?,
+        "urdf" | "xacro" => of_robot(path)?,
         "mcap" => of_commands(path)?,
         "csv" if starts_as_commands(path)? => of_commands(path)?,
         "yaml" | "yml" => match kind_of_yaml(path)? {
@@ -89,13 +89,16 @@ fn of_robot(path: &Path) -> Result<Understood, Diagnostics> {
     let (spec, _, urdf) = read_robot_files(path, &disk, None)?;
     let overrides = LimitsSpec::default();
     let mut files = disk.clone();
-    let robot = robot::parse(RobotInputs {
-        spec: &spec,
-        urdf: (&urdf.name, &urdf.text),
-        files: &mut files,
-        overrides: &overrides,
-    })?;
-    Ok((robot.describe(), plot::robot(&robot)))
+    let inputs = RobotInputs { spec: &spec, urdf: (&urdf.name, &urdf.text), files: &mut files, overrides: &overrides };
+    let (robot, findings) = robot::parse_with_findings(inputs)?;
+    let mut text = robot.describe();
+    if !findings.is_empty() {
+        text += "easily missed\n";
+    }
+    for finding in findings {
+        text += &format!("  {finding}\n");
+    }
+    Ok((text, plot::robot(&robot)))
 }
 
 fn of_map(args: &InspectArgs, path: &Path) -> Result<Understood, Diagnostics> {

@@ -10,6 +10,7 @@ pub mod inspect;
 pub mod output;
 pub mod path_error;
 mod plot;
+pub mod robot;
 pub mod schema;
 pub mod terminal;
 
@@ -41,6 +42,7 @@ enum Command {
     Check(check::CheckArgs),
     PathError(path_error::PathErrorArgs),
     Inspect(inspect::InspectArgs),
+    Robot(robot::RobotArgs),
     Eval(eval::EvalArgs),
     Schema(schema::SchemaArgs),
     /// Print a shell's completion script, such as for `source <(trajc completions bash)`.
@@ -66,6 +68,7 @@ pub fn main() -> u8 {
         Command::Check(args) => check::check(args, &mut terminal),
         Command::PathError(args) => path_error::path_error(args, &mut terminal),
         Command::Inspect(args) => inspect::inspect(args, &mut terminal),
+        Command::Robot(args) => robot::robot(args, &mut terminal),
         Command::Eval(args) => eval::eval(args, &mut terminal),
         Command::Schema(args) => schema::schema(args, &mut terminal),
         Command::Completions { shell } => {
