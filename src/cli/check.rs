@@ -118,6 +118,10 @@ fn readable(args: &CheckArgs, certificate: &Certificate, changed: bool) -> Strin
     if let (Some(proven), Some(required)) = (certificate.clearance_proven, certificate.clearance_required) {
         out += &format!("  clearance     {} proven, {} required\n", mm(proven), mm(required));
     }
+    if let Some(own) = certificate.own_links {
+        let verdict = if own.apart { "kept apart" } else { "not kept apart" };
+        out += &format!("  own links     {} pairs {verdict}\n", own.pairs);
+    }
     out += &format!("  end point     {} off, {} allowed\n", mm(certificate.end_point_error), mm(END_POINT_TOLERANCE));
     if let Some(heading) = certificate.end_heading_error {
         let degrees = |v: f64| format!("{:.4} deg", v.to_degrees());

@@ -42,6 +42,7 @@ fn certified(inputs: &SummaryInputs<'_>) -> String {
     motion(&mut out, report);
     if let Some(certificate) = &report.certificate {
         clearance(&mut out, certificate);
+        own_links(&mut out, report);
         goal(&mut out, certificate);
     }
     limits(&mut out, report);
@@ -71,6 +72,7 @@ fn failed(inputs: &SummaryInputs<'_>) -> String {
     motion(&mut out, report);
     if let Some(certificate) = &report.certificate {
         clearance(&mut out, certificate);
+        own_links(&mut out, report);
         limits(&mut out, report);
     }
     files(&mut out, inputs);
@@ -159,6 +161,24 @@ fn clearance(out: &mut String, certificate: &CertificatePart) {
         let (distance, link) = (figure(closest.distance_m), &closest.link);
         line(out, "", &format!("closest at {} s: {link} is {distance} m from {what}", figure(closest.time_s)));
     }
+}
+
+/// The robot's links against each other; nothing where none move.
+fn own_links(out: &mut String, report: &Report) {
+    let ignored = report.robot.as_ref().map_or(&[][..], |robot| &robot.ignored_pairs);
+    let count = |reason: &str| ignored.iter().filter(|pair| pair.reason == reason).count();
+    let left_out = [("named", "named in robot.yaml"), ("always_touch", "touch always"), ("telescope", "telescope")]
+        .iter()
+        .filter_map(|(reason, words)| Some(count(reason)).filter(|n| *n > 0).map(|n| format!("{n} {words}")))
+        .collect::<Vec<_>>();
+    let left_out = if left_out.is_empty() { String::new() } else { format!("; not checked: {}", left_out.join(", ")) };
+    let said = match report.certificate.as_ref().and_then(|c| c.own_links) {
+        Some(own) if own.keep_apart => format!("{} kept apart{left_out}", counted(own.pairs_checked, "pair")),
+        Some(own) => format!("not kept apart; {} checked{left_out}", counted(own.pairs_checked, "pair")),
+        None if left_out.is_empty() => return,
+        None => left_out.trim_start_matches("; ").to_string(),
+    };
+    line(out, "own links", &said);
 }
 
 fn goal(out: &mut String, certificate: &CertificatePart) {
