@@ -176,6 +176,15 @@ impl RobotModel {
     }
 }
 
+impl RobotModel {
+    /// A pair of shapes of `pairs`, as from [`RobotModel::self_pairs`], that touch each other at joint values `q`.
+    pub fn touching(&self, pairs: &[[usize; 2]], q: &[f64]) -> Option<[usize; 2]> {
+        let poses = self.shape_poses(q);
+        let meet = |[a, b]: &&[usize; 2]| touch(&self.shapes[*a], &poses[*a], &self.shapes[*b], &poses[*b]);
+        pairs.iter().find(meet).copied()
+    }
+}
+
 /// Two links that touch in some of the postures that were looked at.
 pub(super) struct Meeting {
     /// In the order of the URDF.

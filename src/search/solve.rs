@@ -73,9 +73,18 @@ impl<'a, const W: usize> Solver<'a, W> {
     /// The end that is blocked.
     pub fn new(problem: Problem<'a>, grid: PostureGrid) -> Result<Self, End> {
         let Problem { map, esdf, robot, query, options } = problem;
-        let collider = Collider::<W>::new(robot, esdf, map, options.clearance, grid);
-        let start_postures = free_postures(&collider, query.start, &query.start_joints).ok_or(End::Start)?;
-        let goal_postures = goal_postures(&collider, query).ok_or(End::Goal)?;
+        let mut collider = Collider::<W>::new(robot, esdf, map, options.clearance, grid);
+        let mut start_postures = free_postures(&collider, query.start, &query.start_joints).ok_or(End::Start)?;
+        let mut goal_postures = goal_postures(&collider, query).ok_or(End::Goal)?;
+        // Where an end leaves no other choice, samples in which links touch stay: the exact joint values may be apart.
+        let mut touching = collider.touching();
+        for postures in [&mut start_postures, &mut goal_postures] {
+            match postures.minus(touching) {
+                apart if apart.is_empty() => touching = touching.minus(*postures),
+                apart => *postures = apart,
+            }
+        }
+        collider.only(collider.all().minus(touching));
         let (lattice, core) = (Lattice::new(map), Core::new(robot));
         Ok(Self { problem, collider, lattice, core, start_postures, goal_postures })
     }
@@ -188,7 +197,8 @@ impl<'a, const W: usize> Solver<'a, W> {
             }
             // At the lattice's own grain whatever the search got through passes, but for the tolerance of the checks.
             let lenient = (clearance - CHECK_TOLERANCE).max(0.0);
-            let lenient = Collider::<W>::new(robot, esdf, map, lenient, self.collider.grid.clone());
+            let mut lenient = Collider::<W>::new(robot, esdf, map, lenient, self.collider.grid.clone());
+            lenient.only(self.collider.all());
             if let Ok(path) = self.finish(&route, Grain::FINE, &lenient, expanded) {
                 return Ok(path);
             }

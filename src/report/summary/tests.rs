@@ -52,7 +52,8 @@ fn report() -> Report {
         wheel_radius_m: 0.08,
         track_width_m: 0.32,
         joints: vec![joint("blade", false)],
-        shapes: 5, ignored_pairs: Vec::new(),
+        shapes: 5,
+        ignored_pairs: Vec::new(),
     });
     report.trajectory = Some(TrajectoryPart {
         source: "optimised".into(),

@@ -101,3 +101,17 @@ fn what_always_touches_is_left_out_and_what_touches_at_rest_alone_is_checked() {
     let spec = RobotSpec { ignore_pairs: Some(Vec::new()), ..RobotSpec::default() };
     assert_eq!(ignored(&read(&with_wheels(&arm), &spec).unwrap()), []);
 }
+
+#[test]
+fn links_touch_where_their_shapes_overlap_and_not_a_tenth_of_a_millimetre_beside() {
+    // A hand on a slide along x; its box ends 0.2 m beyond the joint, the base's at 0.2 m on the other side.
+    let slide =
+        r#"<origin xyz="-0.6 0 0.2"/><axis xyz="1 0 0"/><limit lower="0" upper="0.5" effort="1" velocity="0.2"/>"#;
+    let post = r#"<link name="post"/><joint name="p" type="fixed"><parent link="base"/><child link="post"/></joint>"#;
+    let urdf = with_wheels(&(post.to_string() + &limb("h", "prismatic", "post", "hand", slide)));
+    let robot = read(&urdf, &RobotSpec::default()).unwrap();
+    let pairs = robot.self_pairs();
+    assert_eq!(robot.touching(&pairs, &[0.1999]), None);
+    let met = robot.touching(&pairs, &[0.2001]).expect("they overlap");
+    assert_eq!(met.map(|shape| robot.shapes[shape].link.as_str()), ["base", "hand"]);
+}
