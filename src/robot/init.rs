@@ -286,8 +286,8 @@ impl Page {
 
 /// A name as YAML reads it back: plain where it can be.
 fn yaml(name: &str) -> String {
-    let plain = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
-        && name.chars().all(|c| c.is_ascii_alphanumeric() || "_-./".contains(c));
+    let begins = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_' || c == '/') || name.starts_with("../");
+    let plain = begins && name.chars().all(|c| c.is_ascii_alphanumeric() || "_-./".contains(c));
     let word =
         ["true", "false", "null", "yes", "no", "on", "off", "y", "n"].contains(&name.to_ascii_lowercase().as_str());
     if plain && !word { name.into() } else { serde_json::Value::from(name).to_string() }

@@ -350,7 +350,7 @@ impl Check<'_> {
                 let message = format!("{key}=\"{}\": expected {what}", attribute.value());
                 let mut fault = Diagnostic::error("robot/not-a-number", message).at(&self.attribute_span(&attribute));
                 if attribute.value().contains("${") {
-                    fault = fault.hint(format!("this looks like xacro: {}", expand(&self.source.name)));
+                    fault = fault.hint(format!("this looks like xacro; {}", expand(&self.source.name)));
                 }
                 self.faults.push(fault);
                 None

@@ -66,6 +66,8 @@ pub(super) struct Solver<'a, const W: usize> {
     pub core: Core,
     start_postures: Bits<W>,
     goal_postures: Bits<W>,
+    /// Postures left out because links of the robot touch in them.
+    touching: Bits<W>,
 }
 
 impl<'a, const W: usize> Solver<'a, W> {
@@ -86,7 +88,14 @@ impl<'a, const W: usize> Solver<'a, W> {
         }
         collider.only(collider.all().minus(touching));
         let (lattice, core) = (Lattice::new(map), Core::new(robot));
-        Ok(Self { problem, collider, lattice, core, start_postures, goal_postures })
+        Ok(Self { problem, collider, lattice, core, start_postures, goal_postures, touching })
+    }
+
+    /// Takes the postures in which links touch back in; whether there were any. What comes of it the certificate judges, which names the
+    /// links where a search could only say that there is no way.
+    pub fn let_links_touch(&mut self) -> bool {
+        self.collider.only(self.collider.all().or(self.touching));
+        !std::mem::replace(&mut self.touching, Bits::EMPTY).is_empty()
     }
 
     /// The first that passes of the straight ways, those that count turns, and the guide's. None proves nothing.
