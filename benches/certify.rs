@@ -9,7 +9,9 @@ use trajc::command::{CommandRow, CommandTable};
 use trajc::geom::Pose2;
 use trajc::map::VoxelMap;
 use trajc::mission::{Sampling, Unknown};
-use trajc::robot::{BaseLimits, Body, BodyMotion, Convex, MotionLimits, MovingJoint, RobotModel, Shape};
+use trajc::robot::{
+    BaseLimits, Body, BodyMotion, Convex, IgnoreReason, IgnoredPair, MotionLimits, MovingJoint, RobotModel, Shape,
+};
 
 /// Base, two wheels, a castor and two blades on tilted hinges, as in robots/scr_db.
 fn robot() -> RobotModel {
@@ -19,15 +21,20 @@ fn robot() -> RobotModel {
     let hinge = |side: f64| {
         let axis = Unit::new_normalize(Vector3::new(0.0, side, 1.0));
         let motion = BodyMotion { joint: 0, multiplier: side, offset: 0.0, axis, prismatic: false };
-        body("blade", Isometry3::translation(0.0, 0.1 * side, 0.27), Some(motion))
+        body(
+            if side > 0.0 { "left_blade" } else { "right_blade" },
+            Isometry3::translation(0.0, 0.1 * side, 0.27),
+            Some(motion),
+        )
     };
     let shape = |link: &str, body, pose, convex| Shape { link: link.into(), body, pose, convex };
     let wheel = |side: f64| {
         let pose = Isometry3::new(Vector3::new(0.0, 0.16 * side, 0.08), Vector3::x() * std::f64::consts::FRAC_PI_2);
         shape("wheel", 0, pose, Convex::Cylinder { radius: 0.08, half_length: 0.02 })
     };
-    let blade =
-        |body| shape("blade", body, Isometry3::translation(0.0, 0.0, 0.19), Convex::Box { half: [0.05, 0.01, 0.18] });
+    let blade = |link, body| {
+        shape(link, body, Isometry3::translation(0.0, 0.0, 0.19), Convex::Box { half: [0.05, 0.01, 0.18] })
+    };
     RobotModel {
         name: "bench".into(),
         wheel_radius: 0.08,
@@ -47,8 +54,8 @@ fn robot() -> RobotModel {
             wheel(1.0),
             wheel(-1.0),
             shape("castor", 0, Isometry3::translation(-0.25, 0.0, 0.04), Convex::Sphere { radius: 0.04 }),
-            blade(1),
-            blade(2),
+            blade("left_blade", 1),
+            blade("right_blade", 2),
         ],
         wheel: MotionLimits { speed: Some(1.0), ..limits },
         base: BaseLimits {
@@ -59,7 +66,9 @@ fn robot() -> RobotModel {
             eta: 0.4,
             min_speed: 0.01,
         },
-        ignore_pairs: Vec::new(),
+        ignore_pairs: ["left_blade", "right_blade"]
+            .map(|blade| IgnoredPair { links: ["base".into(), blade.into()], reason: IgnoreReason::Joined })
+            .into(),
     }
 }
 
@@ -122,6 +131,11 @@ fn map(table: &CommandTable, room: f64, density: f64) -> VoxelMap {
 fn bench(criterion: &mut Criterion) {
     let robot = robot();
     let (table, task) = commands(&robot);
+    let mut careless = robot.clone();
+    for a in &robot.shapes {
+        let pair = |b: &Shape| IgnoredPair { links: [a.link.clone(), b.link.clone()], reason: IgnoreReason::Named };
+        careless.ignore_pairs.extend(robot.shapes.iter().map(pair));
+    }
     for (name, room, density) in
         [("canyon", 0.56, 1.1), ("scattered", 0.56, 0.05), ("rubble", 0.56, 0.5), ("open", 1.2, 0.02)]
     {
@@ -133,6 +147,10 @@ fn bench(criterion: &mut Criterion) {
         );
         criterion.bench_function(&format!("certify/{name}"), |b| {
             b.iter(|| certify(black_box(&table), &robot, Some(&map), &task))
+        });
+        // What the robot's own links cost: the same without them.
+        criterion.bench_function(&format!("certify/{name} without own links"), |b| {
+            b.iter(|| certify(black_box(&table), &careless, Some(&map), &task))
         });
     }
 }

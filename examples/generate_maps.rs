@@ -166,8 +166,46 @@ pub fn site() -> Vec<u8> {
             }
         }
     }
+    ply("a site of 5 x 6 m with boxes and tapes", &points)
+}
+
+/// The home's sides, cells: 6 x 5 m.
+const HOME: [u32; 2] = [120, 100];
+/// The wall between the home's two rooms, 1.5 m high and one cell thick; two ways through it: a tall gap of 0.85 m, and a door of 1.20 m
+/// under a lintel at 1.25 m.
+const PARTITION: [Block; 4] = [
+    [[0, 17], [50, 51], [0, 30]],
+    [[34, 60], [50, 51], [0, 30]],
+    [[84, 120], [50, 51], [0, 30]],
+    [[60, 84], [50, 51], [25, 30]],
+];
+/// A shelf along the northern wall, 0.4 m deep: two boards and two sides. 0.35 m is left between the boards, from 0.30 to 0.65 m.
+const SHELF: [Block; 4] = [
+    [[30, 66], [92, 100], [5, 6]],
+    [[30, 66], [92, 100], [13, 14]],
+    [[29, 30], [92, 100], [0, 14]],
+    [[66, 67], [92, 100], [0, 14]],
+];
+
+/// `maps/home.ply`: two rooms for tall robots with arms and lifts. Floor points (z = 0) on every fourth cell.
+pub fn home() -> Vec<u8> {
+    let mut points: Vec<[f64; 3]> = Vec::new();
+    let every_fourth = |cells: u32| (0..cells).step_by(4).chain([cells - 1]);
+    points.extend(every_fourth(HOME[0]).flat_map(|i| every_fourth(HOME[1]).map(move |j| [middle(i), middle(j), 0.0])));
+    for [x, y, z] in PARTITION.into_iter().chain(SHELF) {
+        for i in x[0]..x[1] {
+            for j in y[0]..y[1] {
+                points.extend((z[0]..z[1]).map(|k| [middle(i), middle(j), middle(k)]));
+            }
+        }
+    }
+    ply("a home of two rooms with a shelf", &points)
+}
+
+/// Points as a binary PLY file.
+fn ply(what: &str, points: &[[f64; 3]]) -> Vec<u8> {
     let mut file = format!(
-        "ply\nformat binary_little_endian 1.0\ncomment a site of 5 x 6 m with boxes and tapes; made by examples/generate_maps.rs\n\
+        "ply\nformat binary_little_endian 1.0\ncomment {what}; made by examples/generate_maps.rs\n\
          element vertex {}\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
         points.len()
     )
@@ -177,8 +215,8 @@ pub fn site() -> Vec<u8> {
 }
 
 /// Everything, by file name.
-pub fn all() -> [(&'static str, Vec<u8>); 3] {
-    [("arch_bridges.pcd", arch_bridges()), ("first.csv", first()), ("site.ply", site())]
+pub fn all() -> [(&'static str, Vec<u8>); 4] {
+    [("arch_bridges.pcd", arch_bridges()), ("first.csv", first()), ("home.ply", home()), ("site.ply", site())]
 }
 
 #[allow(dead_code)] // not called where a test includes this file

@@ -481,7 +481,12 @@ fn given_path(
 fn refused(certificate: &Certificate, source: TrajectorySource) -> Diagnostic {
     let reasons: Vec<&str> = certificate.refusals.iter().map(|r| r.message.as_str()).collect();
     let too_close = certificate.refusals.iter().all(|r| r.kind == RefusalKind::Clearance);
+    let own_links = certificate.refusals.iter().any(|r| r.kind == RefusalKind::OwnLinks);
     let hint = match source {
+        _ if own_links => {
+            "other joint values at start and goal may keep them apart; where shapes are drawn too large, name the pair in robot.yaml's \
+             `collision: {ignore_pairs}`: `trajc robot init URDF` lists such pairs"
+        }
         TrajectorySource::Given if too_close => {
             "a given path is driven as it is: lead it around the obstacle, or lower `clearance_m`"
         }

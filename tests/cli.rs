@@ -15,5 +15,7 @@ mod check;
 mod compile;
 #[path = "cli/inspect.rs"]
 mod inspect;
+#[path = "cli/robot.rs"]
+mod robot;
 #[path = "cli/sandbox.rs"]
 mod sandbox;

@@ -1,4 +1,5 @@
-//! Distance of a posed convex shape and an axis-aligned box, with a proof: a plane that separates them by at least as much.
+//! Distance of a posed convex shape from an axis-aligned box or another shape, with a proof: a plane that separates them by at least as
+//! much.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -29,7 +30,7 @@ pub(super) struct Posed<'a> {
 pub(super) struct Separation {
     /// Distance of two points, one in each body. Zero: they meet.
     pub(super) upper: f64,
-    /// Unit vector from the shape to the box across which they are farthest apart; `None` where they meet.
+    /// Unit vector from the shape to the other body across which they are farthest apart; `None` where they meet.
     pub(super) normal: Option<Vector3<f64>>,
 }
 
@@ -88,31 +89,15 @@ impl Posed<'_> {
         if toward.norm_squared() == 0.0 {
             toward = Vector3::z();
         }
-        let mut simplex = Simplex::new(corner(&toward));
-        let mut best = Separation { upper: f64::INFINITY, normal: None };
-        let mut lower = f64::NEG_INFINITY;
-        for _ in 0..CORNERS {
-            let Some(nearest) = simplex.reduce() else {
-                return Separation { upper: 0.0, normal: None };
-            };
-            let distance = nearest.norm();
-            if distance <= TOUCHING {
-                return Separation { upper: 0.0, normal: None };
-            }
-            let stalled = distance >= best.upper;
-            best.upper = best.upper.min(distance);
-            let normal = nearest / -distance;
-            let next = corner(&normal);
-            let slab = -normal.dot(&next);
-            if slab > lower {
-                (lower, best.normal) = (slab, Some(normal));
-            }
-            if best.upper - lower <= GAP || stalled || simplex.has(&next) {
-                break;
-            }
-            simplex.push(next);
-        }
-        best
+        descend(corner, toward)
+    }
+
+    /// The distance to another shape, found alike; the normal points to it.
+    pub(super) fn separation_from(&self, other: &Posed<'_>) -> Separation {
+        let between = self.centre - other.centre;
+        let farthest = |posed: &Posed<'_>, d: &Vector3<f64>| posed.turn * posed.convex.support(&posed.turn.tr_mul(d));
+        let corner = |away: &Vector3<f64>| farthest(self, away) - farthest(other, &-away) + between;
+        descend(corner, if between.norm_squared() == 0.0 { Vector3::z() } else { -between })
     }
 
     /// How far the shape must move, at most, to leave a box that it overlaps, m: the least overlap across the faces of both
@@ -128,6 +113,36 @@ impl Posed<'_> {
     }
 }
 
+/// The distance from the origin to the difference of two bodies, by its corners (the farthest point in a direction) and a first guess
+/// `toward` of the direction from the first body to the second.
+fn descend(corner: impl Fn(&Vector3<f64>) -> Vector3<f64>, toward: Vector3<f64>) -> Separation {
+    let mut simplex = Simplex::new(corner(&toward));
+    let mut best = Separation { upper: f64::INFINITY, normal: None };
+    let mut lower = f64::NEG_INFINITY;
+    for _ in 0..CORNERS {
+        let Some(nearest) = simplex.reduce() else {
+            return Separation { upper: 0.0, normal: None };
+        };
+        let distance = nearest.norm();
+        if distance <= TOUCHING {
+            return Separation { upper: 0.0, normal: None };
+        }
+        let stalled = distance >= best.upper;
+        best.upper = best.upper.min(distance);
+        let normal = nearest / -distance;
+        let next = corner(&normal);
+        let slab = -normal.dot(&next);
+        if slab > lower {
+            (lower, best.normal) = (slab, Some(normal));
+        }
+        if best.upper - lower <= GAP || stalled || simplex.has(&next) {
+            break;
+        }
+        simplex.push(next);
+    }
+    best
+}
+
 /// The least `normal . (b - from)` over the points b of a box.
 pub(super) fn nearest_along(normal: &Vector3<f64>, obstacle: &Aabb, from: &Vector3<f64>) -> f64 {
     (0..3)
@@ -140,15 +155,14 @@ pub(super) fn nearest_along(normal: &Vector3<f64>, obstacle: &Aabb, from: &Vecto
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
-    use nalgebra::{Isometry3, UnitQuaternion};
-    use parry3d_f64::math::{Pose, Vector};
+    use nalgebra::Isometry3;
+    use parry3d_f64::math::Vector;
     use parry3d_f64::query;
-    use parry3d_f64::shape::{Ball, ConvexPolyhedron, Cuboid, Cylinder, SharedShape};
+    use parry3d_f64::shape::Cuboid;
     use proptest::prelude::*;
 
     use super::*;
+    use crate::certify::tests::peer::{peer, peer_pose};
 
     fn posed<'a>(convex: &'a Convex, pose: &Isometry3<f64>) -> Posed<'a> {
         let turn = pose.rotation.to_rotation_matrix().into_inner();
@@ -174,30 +188,6 @@ mod tests {
     fn any_box() -> impl Strategy<Value = Aabb> {
         ([-1.0..1.0, -1.0..1.0, -1.0..1.0f64], [0.01..0.8, 0.01..0.8, 0.01..0.8f64])
             .prop_map(|(min, size)| Aabb { min, max: std::array::from_fn(|i| min[i] + size[i]) })
-    }
-
-    /// The same bodies in another library (its cylinders have their axis along y).
-    fn peer(convex: &Convex) -> Option<(SharedShape, UnitQuaternion<f64>)> {
-        let straight = UnitQuaternion::identity();
-        Some(match convex {
-            Convex::Box { half } => {
-                (SharedShape(Arc::new(Cuboid::new(Vector::new(half[0], half[1], half[2])))), straight)
-            }
-            Convex::Cylinder { radius, half_length } => (
-                SharedShape(Arc::new(Cylinder::new(*half_length, *radius))),
-                UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2),
-            ),
-            Convex::Sphere { radius } => (SharedShape(Arc::new(Ball::new(*radius))), straight),
-            Convex::Hull { vertices } => {
-                let points: Vec<_> = vertices.iter().map(|v| Vector::new(v[0], v[1], v[2])).collect();
-                (SharedShape(Arc::new(ConvexPolyhedron::from_convex_hull(&points)?)), straight)
-            }
-        })
-    }
-
-    fn peer_pose(pose: &Isometry3<f64>) -> Pose {
-        let (t, r) = (pose.translation.vector, pose.rotation.scaled_axis());
-        Pose::new(Vector::new(t.x, t.y, t.z), Vector::new(r.x, r.y, r.z))
     }
 
     proptest! {
@@ -228,6 +218,23 @@ mod tests {
             let expected = query::distance(&peer_pose(&(pose * turned)), &*other.0, &peer_pose(&middle), &cuboid);
             let found = posed(&convex, &pose).separation(&obstacle).upper;
             prop_assert!((found - expected.unwrap().distance).abs() < 1e-5, "{found} {expected:?}");
+        }
+
+        #[test]
+        fn the_distance_of_two_shapes_is_that_of_another_library_with_a_plane_between_them(
+            first in any_convex(), pose in any_pose(), second in any_convex(), other in any_pose(),
+        ) {
+            let found = posed(&first, &pose).separation_from(&posed(&second, &other));
+            if let Some(normal) = found.normal {
+                let (a, b) = (posed(&first, &pose), posed(&second, &other));
+                let lower = normal.dot(&(b.centre - a.centre)) - a.reach(&normal) - b.reach(&-normal);
+                prop_assert!(lower <= found.upper + 1e-13 && found.upper - lower <= 1.01e-7, "{} {lower}", found.upper);
+            } else {
+                prop_assert_eq!(found.upper, 0.0);
+            }
+            let (Some((a, turned_a)), Some((b, turned_b))) = (peer(&first), peer(&second)) else { return Ok(()) };
+            let expected = query::distance(&peer_pose(&(pose * turned_a)), &*a.0, &peer_pose(&(other * turned_b)), &*b.0);
+            prop_assert!((found.upper - expected.unwrap().distance).abs() < 1e-5, "{} {expected:?}", found.upper);
         }
     }
 

@@ -7,6 +7,7 @@ mod ends;
 mod limits;
 mod motion;
 mod obstacles;
+mod own_links;
 mod rollout;
 mod series;
 mod simplex;
@@ -65,6 +66,8 @@ pub struct Certificate {
     pub clearance_proven: Option<f64>,
     /// Where the least clearance was met.
     pub closest: Option<Closest>,
+    /// The robot's links against each other; `None` where none that are checked move against each other.
+    pub own_links: Option<OwnLinks>,
     /// m.
     pub end_point_error: f64,
     /// rad; `None` where the goal leaves the heading open.
@@ -84,6 +87,15 @@ impl Certificate {
     }
 }
 
+/// What was proven of the robot's links against each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OwnLinks {
+    /// Pairs of links that were checked: those that move against each other, but for [`RobotModel::ignore_pairs`].
+    pub pairs: usize,
+    /// Whether none of them touch at any instant.
+    pub apart: bool,
+}
+
 /// A reason to refuse.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Refusal {
@@ -100,6 +112,8 @@ pub struct Refusal {
 pub enum RefusalKind {
     /// Clearance not proven.
     Clearance,
+    /// The robot's links touch each other.
+    OwnLinks,
     /// Speed, acceleration or jerk.
     Limit,
     /// Joint position.
@@ -152,7 +166,8 @@ pub fn clearance_proven(table: &CommandTable, robot: &RobotModel, map: &VoxelMap
     clearance::clearance(&rollout, robot, map, task.clearance).proven
 }
 
-/// Judges a command table: replays it from the task's start and checks table, limits, ends and, with a map, clearance.
+/// Judges a command table: replays it from the task's start and checks table, limits, ends, the robot's
+/// links against each other and, with a map, clearance.
 ///
 /// A table that cannot be replayed (no rows, numbers that are not finite, joints that are not the robot's) is refused with
 /// [`RefusalKind::Table`] and without figures: errors infinite, no peaks, clearance zero.
@@ -161,6 +176,7 @@ pub fn certify(table: &CommandTable, robot: &RobotModel, map: Option<&VoxelMap>,
         clearance_required: map.map(|_| task.clearance),
         clearance_proven: map.map(|_| 0.0),
         closest: None,
+        own_links: None,
         end_point_error: f64::INFINITY,
         end_heading_error: task.goal.yaw.map(|_| f64::INFINITY),
         limits: Vec::new(),
@@ -187,6 +203,11 @@ pub fn certify(table: &CommandTable, robot: &RobotModel, map: Option<&VoxelMap>,
     certificate.end_point_error = ends.point;
     certificate.end_heading_error = ends.heading;
     certificate.refusals.extend(ends.refusals);
+
+    if let Some((links, refusal)) = own_links::own_links(&rollout, robot) {
+        certificate.own_links = Some(links);
+        certificate.refusals.extend(refusal);
+    }
 
     if let Some(map) = map {
         let clearance = clearance::clearance(&rollout, robot, map, task.clearance);

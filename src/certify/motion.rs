@@ -58,11 +58,23 @@ impl MovingShape<'_> {
     /// How far the shape reaches along the unit vector `normal` from where its centre is now, at any instant up to `half`
     /// seconds before (first) and after (second); at least, in m.
     pub(super) fn reach(&self, normal: &Vector3<f64>, half: f64) -> [f64; 2] {
-        let (shift, turned) = (half * normal.dot(&self.velocity), normal.cross(&self.spin) * half);
-        let bend = 0.5 * half * half * self.acceleration;
         let now = self.posed.reach(normal);
-        let at = |sign: f64| (sign * shift + self.posed.reach(&(normal + turned * sign)) + bend).max(now);
-        [at(-1.0), at(1.0)]
+        [-half, half].map(|tau| self.reach_after(normal, tau).max(now))
+    }
+
+    /// A bound on how far the shape reaches along `normal`, from where its centre is now, `tau` seconds from now (before, if negative).
+    /// Convex in `tau`.
+    fn reach_after(&self, normal: &Vector3<f64>, tau: f64) -> f64 {
+        let turned = normal + normal.cross(&self.spin) * tau;
+        tau * normal.dot(&self.velocity) + self.posed.reach(&turned) + 0.5 * tau * tau * self.acceleration
+    }
+
+    /// How far this shape along the unit vector `normal`, and `other` against it, reach together from where their centres are now, at any
+    /// instant up to `half` seconds before and after; at least, in m. What they move alike cancels.
+    pub(super) fn reach_towards(&self, other: &MovingShape<'_>, normal: &Vector3<f64>, half: f64) -> f64 {
+        let both = |tau: f64| self.reach_after(normal, tau) + other.reach_after(&-normal, tau);
+        // A convex function is greatest at an end.
+        both(-half).max(both(half))
     }
 }
 

@@ -2,4 +2,6 @@
 
 mod clearance;
 mod faults;
+mod own_links;
+pub(crate) mod peer;
 pub(crate) mod robots;

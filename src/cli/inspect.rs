@@ -60,7 +60,7 @@ pub fn inspect(args: &InspectArgs, terminal: &mut Terminal) -> Result<u8, Diagno
     let path = args.file.as_path();
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let understood = match ending.as_str() {
-        "urdf" => of_robot(path)?,
+        "urdf" | "xacro" => of_robot(path)?,
         "mcap" => commands::describe(path)?,
         "csv" if starts_as_commands(path)? => commands::describe(path)?,
         "yaml" | "yml" => match kind_of_yaml(path)? {
@@ -101,14 +101,17 @@ fn of_robot(path: &Path) -> Result<Understood, Diagnostics> {
     let (spec, _, urdf) = read_robot_files(path, &disk, None)?;
     let overrides = LimitsSpec::default();
     let mut files = disk.clone();
-    let robot = robot::parse(RobotInputs {
-        spec: &spec,
-        urdf: (&urdf.name, &urdf.text),
-        files: &mut files,
-        overrides: &overrides,
-    })?;
+    let inputs = RobotInputs { spec: &spec, urdf: (&urdf.name, &urdf.text), files: &mut files, overrides: &overrides };
+    let (robot, findings) = robot::parse_with_findings(inputs)?;
     let json = json!(RobotPart::from(&robot));
-    Ok(Understood { text: robot.describe(), json, figure: plot::robot(&robot) })
+    let mut text = robot.describe();
+    if !findings.is_empty() {
+        text += "easily missed\n";
+    }
+    for finding in findings {
+        text += &format!("  {finding}\n");
+    }
+    Ok(Understood { text, json, figure: plot::robot(&robot) })
 }
 
 fn of_map(args: &InspectArgs, path: &Path) -> Result<Understood, Diagnostics> {

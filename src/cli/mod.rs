@@ -10,6 +10,7 @@ pub mod output;
 pub mod path_error;
 pub mod play;
 mod plot;
+pub mod robot;
 pub mod schema;
 pub mod terminal;
 
@@ -43,6 +44,7 @@ enum Command {
     PathError(path_error::PathErrorArgs),
     Play(play::PlayArgs),
     Inspect(inspect::InspectArgs),
+    Robot(robot::RobotArgs),
     Eval(eval::EvalArgs),
     Schema(schema::SchemaArgs),
     /// Print a shell's completion script, such as for `source <(trajc completions bash)`.
@@ -69,6 +71,7 @@ pub fn main() -> u8 {
         Command::PathError(args) => path_error::path_error(args, &mut terminal),
         Command::Play(args) => play::play(args, &mut terminal),
         Command::Inspect(args) => inspect::inspect(args, &mut terminal),
+        Command::Robot(args) => robot::robot(args, &mut terminal),
         Command::Eval(args) => eval::eval(args, &mut terminal),
         Command::Schema(args) => schema::schema(args, &mut terminal),
         Command::Completions { shell } => {

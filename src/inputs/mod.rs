@@ -74,7 +74,8 @@ pub fn read_robot_files(
     disk: &Disk,
     named_by: Option<&crate::diag::Span>,
 ) -> Result<RobotFiles, Diagnostics> {
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("urdf")) {
+    // A xacro file is read as the URDF it is not yet: the reader says how to expand it.
+    if path.extension().is_some_and(|e| ["urdf", "xacro"].iter().any(|own| e.eq_ignore_ascii_case(own))) {
         return Ok((spec::RobotSpec::default(), None, disk.text(path, named_by)?));
     }
     let yaml = disk.text(path, named_by)?;

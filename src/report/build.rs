@@ -8,7 +8,7 @@ use crate::certify::{Certificate, Closest, LimitCheck, Refusal, RefusalKind};
 use crate::command::CommandTable;
 use crate::diag::{Diagnostics, Severity};
 use crate::map::VoxelMap;
-use crate::robot::{MovingJoint, RobotModel};
+use crate::robot::{IgnoreReason, IgnoredPair, MovingJoint, RobotModel};
 use crate::search::SearchPath;
 use crate::trajectory::{Leg, Trajectory, TrajectorySource};
 
@@ -74,6 +74,7 @@ fn refusal(refusals: &[Refusal]) -> Option<Failure> {
 fn refusal_kind(kind: RefusalKind) -> &'static str {
     match kind {
         RefusalKind::Clearance => "clearance",
+        RefusalKind::OwnLinks => "own_links",
         RefusalKind::Limit => "limit",
         RefusalKind::Position => "position",
         RefusalKind::Reverse => "reverse",
@@ -133,7 +134,20 @@ impl From<&RobotModel> for RobotPart {
             track_width_m: robot.track_width,
             joints: robot.joints.iter().map(JointPart::from).collect(),
             shapes: robot.shapes.len(),
+            ignored_pairs: robot.ignore_pairs.iter().map(IgnoredPairPart::from).collect(),
         }
+    }
+}
+
+impl From<&IgnoredPair> for IgnoredPairPart {
+    fn from(pair: &IgnoredPair) -> Self {
+        let reason = match pair.reason {
+            IgnoreReason::Joined => "joined",
+            IgnoreReason::Named => "named",
+            IgnoreReason::Always => "always_touch",
+            IgnoreReason::Telescope => "telescope",
+        };
+        Self { links: pair.links.clone(), reason: reason.into() }
     }
 }
 
@@ -214,6 +228,9 @@ impl From<&Certificate> for CertificatePart {
             end_heading_error_rad: certificate.end_heading_error.and_then(finite),
             limits_hold: certificate.limits_hold,
             closest: certificate.closest.as_ref().and_then(closest),
+            own_links: certificate
+                .own_links
+                .map(|own| OwnLinksPart { pairs_checked: own.pairs, keep_apart: own.apart }),
         }
     }
 }
@@ -255,6 +272,7 @@ mod tests {
                 obstacle: Some(Aabb { min: [4.0, 4.05, 0.25], max: [4.05, 4.1, 0.3] }),
                 distance: 0.0523,
             }),
+            own_links: None,
             end_point_error: 4e-5,
             end_heading_error: None,
             limits: vec![LimitCheck { actuator: "wheel_left".into(), quantity: "jerk", peak: 0.1, limit: None }],

@@ -122,6 +122,18 @@ pub struct RobotPart {
     pub joints: Vec<JointPart>,
     /// Number of collision shapes.
     pub shapes: usize,
+    /// Pairs of links that move against each other and are not checked against each other.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ignored_pairs: Vec<IgnoredPairPart>,
+}
+
+/// A pair of links that is not checked.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct IgnoredPairPart {
+    /// URDF links.
+    pub links: [String; 2],
+    /// `joined`: by a joint; `named`: in robot.yaml; `always_touch`: in every posture; `telescope`: tubes of one.
+    pub reason: String,
 }
 
 /// A moving joint; `null`: given nowhere. Units: rad or, when prismatic, m.
@@ -261,6 +273,18 @@ pub struct CertificatePart {
     /// The closest approach found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub closest: Option<ClosestPart>,
+    /// The robot's links against each other; absent where none that are checked move against each other.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub own_links: Option<OwnLinksPart>,
+}
+
+/// What was proven of the robot's links against each other.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OwnLinksPart {
+    /// Pairs of links that were checked; those that were not: `robot.ignored_pairs`.
+    pub pairs_checked: usize,
+    /// Whether none of them touch at any instant.
+    pub keep_apart: bool,
 }
 
 /// What is written for a clearance without bound, m: JSON has no infinity, and a lower bound may be any smaller number.

@@ -4,7 +4,7 @@ mod limits;
 
 use std::fmt::Write;
 
-use super::schema::{CertificatePart, LimitPart, Report, Status};
+use super::schema::{CertificatePart, LimitPart, Report, RobotPart, Status};
 use crate::certify::{END_ANGLE_TOLERANCE, END_POINT_TOLERANCE};
 pub use limits::table as limits_table;
 
@@ -45,7 +45,7 @@ fn certified(inputs: &SummaryInputs<'_>) -> String {
     let mut out = format!("{}: {}\n\n", inputs.mission, paint("CERTIFIED", 32, inputs.colour));
     motion(&mut out, report);
     if let Some(certificate) = &report.certificate {
-        proof(&mut out, certificate, &report.limits, &prismatic(report));
+        proof(&mut out, certificate, &report.limits, report.robot.as_ref());
     }
     path_error(&mut out, report);
     files(&mut out, inputs);
@@ -65,7 +65,8 @@ fn failed(inputs: &SummaryInputs<'_>) -> String {
     motion(&mut out, report);
     if let Some(certificate) = &report.certificate {
         clearance(&mut out, certificate);
-        limits(&mut out, &report.limits, &prismatic(report));
+        own_links(&mut out, certificate, report.robot.as_ref());
+        limits(&mut out, &report.limits, report.robot.as_ref());
     }
     files(&mut out, inputs);
     // The diagnostic follows.
@@ -73,16 +74,12 @@ fn failed(inputs: &SummaryInputs<'_>) -> String {
     out
 }
 
-/// Lines that tell what a certificate says. `prismatic`: which joints are measured in metres.
-pub fn proof(out: &mut String, certificate: &CertificatePart, peaks: &[LimitPart], prismatic: &dyn Fn(&str) -> bool) {
+/// Lines that tell what a certificate says.
+pub fn proof(out: &mut String, certificate: &CertificatePart, peaks: &[LimitPart], robot: Option<&RobotPart>) {
     clearance(out, certificate);
+    own_links(out, certificate, robot);
     goal(out, certificate);
-    limits(out, peaks, prismatic);
-}
-
-fn prismatic(report: &Report) -> impl Fn(&str) -> bool {
-    let joints = report.robot.as_ref().map_or(&[][..], |r| &r.joints);
-    move |name| joints.iter().any(|j| j.name == name && j.prismatic)
+    limits(out, peaks, robot);
 }
 
 /// Bold and in one of the terminal's eight colours.
@@ -167,6 +164,24 @@ pub fn clearance_text(certificate: &CertificatePart) -> String {
     }
 }
 
+/// The robot's links against each other; nothing where none move.
+fn own_links(out: &mut String, certificate: &CertificatePart, robot: Option<&RobotPart>) {
+    let ignored = robot.map_or(&[][..], |robot| &robot.ignored_pairs);
+    let count = |reason: &str| ignored.iter().filter(|pair| pair.reason == reason).count();
+    let left_out = [("named", "named in robot.yaml"), ("always_touch", "touch always"), ("telescope", "telescope")]
+        .iter()
+        .filter_map(|(reason, words)| Some(count(reason)).filter(|n| *n > 0).map(|n| format!("{n} {words}")))
+        .collect::<Vec<_>>();
+    let left_out = if left_out.is_empty() { String::new() } else { format!("; not checked: {}", left_out.join(", ")) };
+    let said = match certificate.own_links {
+        Some(own) if own.keep_apart => format!("{} kept apart{left_out}", counted(own.pairs_checked, "pair")),
+        Some(own) => format!("not kept apart; {} checked{left_out}", counted(own.pairs_checked, "pair")),
+        None if left_out.is_empty() => return,
+        None => left_out.trim_start_matches("; ").to_string(),
+    };
+    line(out, "own links", &said);
+}
+
 fn goal(out: &mut String, certificate: &CertificatePart) {
     if let Some(text) = goal_text(certificate) {
         line(out, "goal", &text);
@@ -183,8 +198,9 @@ pub fn goal_text(certificate: &CertificatePart) -> Option<String> {
     Some(format!("missed by {missed}; allowed: {allowed}"))
 }
 
-fn limits(out: &mut String, peaks: &[LimitPart], prismatic: &dyn Fn(&str) -> bool) {
-    let table = limits_table(peaks, prismatic);
+fn limits(out: &mut String, peaks: &[LimitPart], robot: Option<&RobotPart>) {
+    let joints = robot.map_or(&[][..], |robot| &robot.joints);
+    let table = limits_table(peaks, &|name| joints.iter().any(|j| j.name == name && j.prismatic));
     if table.is_empty() {
         return;
     }

@@ -90,7 +90,7 @@ pub(super) fn collision_shapes(
 
 /// Links that robot.yaml's `collision` names must exist.
 pub(super) fn check_links(spec: &RobotSpec, urdf: &Urdf, faults: &mut Vec<Diagnostic>) {
-    let pairs = spec.ignore_pairs.iter().flatten().map(|name| ("ignore_pairs", name));
+    let pairs = spec.ignore_pairs.iter().flatten().flatten().map(|name| ("ignore_pairs", name));
     for (key, name) in spec.ignore_links.iter().map(|name| ("ignore_links", name)).chain(pairs) {
         let mut known = urdf.robot.links.iter().map(|l| l.name.as_str());
         if known.clone().any(|link| link == name.value) {

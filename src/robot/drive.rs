@@ -1,31 +1,18 @@
-//! The driving wheels: which joints, how large, and the base frame that they define.
+//! How large the driving wheels are, how far apart, and the base frame that they define.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use urdf_rs::{Geometry, JointType};
+use urdf_rs::Geometry;
 
-use super::joints::named;
 use super::spec::RobotSpec;
 use super::tree::{self, Tree};
 use super::urdf::Urdf;
+use super::wheels::Wheels;
 use crate::diag::{Diagnostic, Diagnostics};
 
 /// Angle below which axes count as parallel, rad: published angles are rounded (-1.57 for -pi/2).
-const PARALLEL: f64 = 0.01;
+pub(super) const PARALLEL: f64 = 0.01;
 /// Largest difference of wheel radii, m.
 const RADIUS_TOLERANCE: f64 = 1e-4;
-
-/// Joints of the driving wheels.
-pub(super) struct Wheels {
-    pub left: Vec<usize>,
-    pub right: Vec<usize>,
-}
-
-impl Wheels {
-    /// All of them, left ones first.
-    pub fn all(&self) -> impl Iterator<Item = usize> {
-        self.left.iter().chain(&self.right).copied()
-    }
-}
 
 /// What the wheels say about the robot.
 pub(super) struct Drive {
@@ -34,95 +21,14 @@ pub(super) struct Drive {
     pub base_from_root: Isometry3<f64>,
 }
 
-/// The driving wheels, named in robot.yaml or found.
-pub(super) fn wheels(spec: &RobotSpec, urdf: &Urdf, tree: &Tree) -> Result<Wheels, Diagnostics> {
-    match (&spec.drive_left[..], &spec.drive_right[..]) {
-        ([], []) => find(urdf, tree),
-        ([], [one, ..]) | ([one, ..], []) => {
-            let (given, missing) = if spec.drive_left.is_empty() { ("right", "left") } else { ("left", "right") };
-            let message = format!("drive.{given} is named, drive.{missing} is not");
-            let fault = Diagnostic::error("robot/wheels-half-named", message).maybe_at(one.span.as_ref());
-            Err(fault.hint("name both, or neither to have them found").into())
-        }
-        (left, right) => {
-            let mut faults = Vec::new();
-            let mut seen = Vec::new();
-            let mut side = |names: &[super::spec::Written<String>]| -> Vec<usize> {
-                let mut found = Vec::new();
-                for name in names {
-                    let Some(j) = named(urdf, name, "drive wheel", &mut faults) else { continue };
-                    let joint = &urdf.robot.joints[j];
-                    if !matches!(joint.joint_type, JointType::Continuous | JointType::Revolute) {
-                        let kind = format!("{:?}", joint.joint_type).to_lowercase();
-                        let message = format!("drive wheel `{}` is a {kind} joint, which does not turn", joint.name);
-                        faults.push(Diagnostic::error("robot/wheel-type", message).maybe_at(name.span.as_ref()));
-                    } else if seen.contains(&j) {
-                        let message = format!("drive wheel `{}` is named twice", joint.name);
-                        faults.push(Diagnostic::error("robot/wheel-twice", message).maybe_at(name.span.as_ref()));
-                    } else {
-                        seen.push(j);
-                        found.push(j);
-                    }
-                }
-                found
-            };
-            let wheels = Wheels { left: side(left), right: side(right) };
-            if faults.is_empty() { Ok(wheels) } else { Err(Diagnostics(faults)) }
-        }
-    }
-}
-
-/// The only two coaxial continuous joints with a horizontal axis that hang on no other continuous joint.
-fn find(urdf: &Urdf, tree: &Tree) -> Result<Wheels, Diagnostics> {
-    let joints = &urdf.robot.joints;
-    let turns = |j: usize| joints[j].joint_type == JointType::Continuous;
-    // Links beyond a continuous joint, which is how castors hang.
-    let mut swivels = vec![false; urdf.robot.links.len()];
-    for j in &tree.order {
-        swivels[tree.child[*j]] = swivels[tree.parent[*j]] || turns(*j);
-    }
-    let own = |j: &usize| turns(*j) && joints[*j].mimic.is_none() && !swivels[tree.parent[*j]];
-    let candidates: Vec<usize> = (0..joints.len()).filter(own).collect();
-    let poses = tree.link_poses(urdf, |_| 0.0);
-    let axes: Vec<Axle> = candidates.iter().map(|j| Axle::of(urdf, tree, &poses, *j)).collect();
-
-    let (mut pairs, mut first) = (0, None);
-    for (l, left) in axes.iter().enumerate() {
-        for (r, right) in axes.iter().enumerate() {
-            let apart = left.origin - right.origin;
-            if apart.y > 1e-6 && left.horizontal() && left.parallel(&right.axis) && left.parallel(&apart) {
-                pairs += 1;
-                first.get_or_insert((candidates[l], candidates[r]));
-            }
-        }
-    }
-    if let (1, Some((left, right))) = (pairs, first) {
-        return Ok(Wheels { left: vec![left], right: vec![right] });
-    }
-    let list: Vec<String> = candidates
-        .iter()
-        .zip(&axes)
-        .map(|(j, a)| {
-            let (o, level) = (a.origin, if a.horizontal() { "" } else { ", axis not horizontal" });
-            format!("`{}` at ({:.3}, {:.3}, {:.3}){level}", joints[*j].name, o.x, o.y, o.z)
-        })
-        .collect();
-    let list = if list.is_empty() { "none".into() } else { list.join("; ") };
-    let message = format!(
-        "drive wheels not found: {pairs} coaxial pairs, not one; continuous joints that could be wheels: {list}"
-    );
-    let fault = Diagnostic::error("robot/wheels-not-found", message).at(&urdf.whole());
-    Err(fault.hint("name drive.left and drive.right in robot.yaml").into())
-}
-
 /// A wheel joint's axis and origin, in the root frame.
-struct Axle {
-    origin: Vector3<f64>,
-    axis: Vector3<f64>,
+pub(super) struct Axle {
+    pub origin: Vector3<f64>,
+    pub axis: Vector3<f64>,
 }
 
 impl Axle {
-    fn of(urdf: &Urdf, tree: &Tree, link_poses: &[Isometry3<f64>], joint: usize) -> Self {
+    pub fn of(urdf: &Urdf, tree: &Tree, link_poses: &[Isometry3<f64>], joint: usize) -> Self {
         // The child's frame: a turn about the axis moves neither origin nor axis.
         let pose = link_poses[tree.child[joint]];
         Self {
@@ -131,11 +37,11 @@ impl Axle {
         }
     }
 
-    fn horizontal(&self) -> bool {
+    pub fn horizontal(&self) -> bool {
         self.axis.z.abs() < PARALLEL
     }
 
-    fn parallel(&self, other: &Vector3<f64>) -> bool {
+    pub fn parallel(&self, other: &Vector3<f64>) -> bool {
         self.axis.cross(other).norm() < PARALLEL * other.norm()
     }
 }
@@ -207,6 +113,14 @@ pub(super) fn drive(
     Ok(Drive { wheel_radius, track_width, base_from_root: root_from_base.inverse() })
 }
 
+/// The radius of a wheel's collision cylinder or sphere, m.
+pub(super) fn round_radius(urdf: &Urdf, tree: &Tree, joint: usize) -> Option<f64> {
+    urdf.robot.links[tree.child[joint]].collision.iter().find_map(|c| match c.geometry {
+        Geometry::Cylinder { radius, .. } | Geometry::Sphere { radius } => Some(radius),
+        _ => None,
+    })
+}
+
 /// The radius given in robot.yaml, else that of the wheels' cylinders and spheres; they must agree in both cases.
 fn wheel_radius(
     spec: &RobotSpec,
@@ -215,13 +129,7 @@ fn wheel_radius(
     wheels: &Wheels,
     faults: &mut Vec<Diagnostic>,
 ) -> Option<f64> {
-    let of = |j: usize| -> Option<f64> {
-        urdf.robot.links[tree.child[j]].collision.iter().find_map(|c| match c.geometry {
-            Geometry::Cylinder { radius, .. } | Geometry::Sphere { radius } => Some(radius),
-            _ => None,
-        })
-    };
-    let known: Vec<(usize, f64)> = wheels.all().filter_map(|j| Some((j, of(j)?))).collect();
+    let known: Vec<(usize, f64)> = wheels.all().filter_map(|j| Some((j, round_radius(urdf, tree, j)?))).collect();
     for (j, radius) in known.iter().skip(1) {
         let (first, expected) = known[0];
         if (radius - expected).abs() > RADIUS_TOLERANCE {

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use urdf_rs::JointType;
 
-use super::drive::Wheels;
 use super::spec::{RobotSpec, Written};
 use super::urdf::Urdf;
+use super::wheels::Wheels;
 use crate::diag::{Diagnostic, Diagnostics, nearest};
 
 /// Value of a joint of the URDF.

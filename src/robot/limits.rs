@@ -1,9 +1,10 @@
 //! Limits: the URDF's, then robot.yaml's, then the mission's, key by key.
 
-use super::drive::{Drive, Wheels};
+use super::drive::Drive;
 use super::joints::{Roles, Value, range, velocity};
 use super::spec::RobotSpec;
 use super::urdf::Urdf;
+use super::wheels::Wheels;
 use super::{BaseLimits, MotionLimits, MovingJoint};
 use crate::diag::{Diagnostic, Span, nearest};
 use crate::mission::{ActuatorLimitsSpec, LimitsSpec};

@@ -5,10 +5,13 @@ mod bound;
 pub mod convex;
 mod describe;
 mod drive;
+mod findings;
 pub mod hull;
+mod init;
 mod joints;
 mod limits;
 pub mod mesh;
+mod pairs;
 mod reach;
 mod shapes;
 pub mod spec;
@@ -16,6 +19,7 @@ pub mod spec;
 mod tests;
 mod tree;
 mod urdf;
+mod wheels;
 
 use std::path::Path;
 
@@ -25,6 +29,9 @@ use crate::diag::Diagnostics;
 use crate::mission::LimitsSpec;
 pub use bodies::NoFiles;
 pub use convex::Convex;
+pub use findings::Finding;
+pub use init::{InitInputs, init};
+pub use pairs::{IgnoreReason, IgnoredPair};
 pub use reach::ShapeReach;
 
 /// Where a stage gets files it must name itself (meshes). `cli` reads the disk, tests and MCAP attachments memory.
@@ -59,8 +66,8 @@ pub struct RobotModel {
     pub wheel: MotionLimits,
     /// Of the base; shapes the plan.
     pub base: BaseLimits,
-    /// Pairs of links whose collision with each other does not count.
-    pub ignore_pairs: Vec<[String; 2]>,
+    /// Pairs of links that move against each other and are not checked against each other; all others are.
+    pub ignore_pairs: Vec<IgnoredPair>,
 }
 
 /// A joint that the planner moves.
@@ -203,10 +210,41 @@ pub struct RobotInputs<'a> {
 /// # Errors
 /// All faults found, with file and line. Faults of the text hide those of the tree, and these those of wheels, joints and limits.
 pub fn parse(inputs: RobotInputs<'_>) -> Result<RobotModel, Diagnostics> {
+    assemble(inputs).map(|made| made.robot)
+}
+
+/// Reads a robot, and finds what is easily missed about its URDF: wheels on springs, castors, telescopes, a root link off the floor.
+///
+/// # Errors
+/// As [`parse`].
+pub fn parse_with_findings(inputs: RobotInputs<'_>) -> Result<(RobotModel, Vec<Finding>), Diagnostics> {
+    let made = assemble(inputs)?;
+    let findings = made.facts().findings();
+    Ok((made.robot, findings))
+}
+
+/// A robot and what it was made from.
+struct Assembled {
+    urdf: urdf::Urdf,
+    tree: tree::Tree,
+    wheels: wheels::Wheels,
+    roles: joints::Roles,
+    drive: drive::Drive,
+    robot: RobotModel,
+}
+
+impl Assembled {
+    fn facts(&self) -> findings::Facts<'_> {
+        let Self { urdf, tree, wheels, roles, drive, .. } = self;
+        findings::Facts { urdf, tree, wheels, roles, drive }
+    }
+}
+
+fn assemble(inputs: RobotInputs<'_>) -> Result<Assembled, Diagnostics> {
     let RobotInputs { spec, urdf: (name, text), files, overrides } = inputs;
     let urdf = urdf::read(name, text)?;
     let tree = tree::Tree::new(&urdf)?;
-    let wheels = drive::wheels(spec, &urdf, &tree)?;
+    let wheels = wheels::wheels(spec, &urdf, &tree)?;
     let roles = joints::roles(spec, &urdf, &wheels)?;
     let drive = drive::drive(spec, &urdf, &tree, &wheels, |joint| roles.at_zero(joint))?;
 
@@ -222,8 +260,7 @@ pub fn parse(inputs: RobotInputs<'_>) -> Result<RobotModel, Diagnostics> {
     if !faults.is_empty() {
         return Err(Diagnostics(faults));
     }
-    let pairs = spec.ignore_pairs.iter().map(|[a, b]| [a.value.clone(), b.value.clone()]);
-    Ok(RobotModel {
+    let mut robot = RobotModel {
         name: spec.name.clone().unwrap_or_else(|| urdf.robot.name.clone()),
         wheel_radius: drive.wheel_radius,
         track_width: drive.track_width,
@@ -234,6 +271,8 @@ pub fn parse(inputs: RobotInputs<'_>) -> Result<RobotModel, Diagnostics> {
         shapes,
         wheel,
         base,
-        ignore_pairs: pairs.collect(),
-    })
+        ignore_pairs: Vec::new(),
+    };
+    robot.ignore_pairs = pairs::ignored(spec, &urdf, &tree, &roles, &robot);
+    Ok(Assembled { urdf, tree, wheels, roles, drive, robot })
 }

@@ -42,8 +42,8 @@ pub struct RobotSpec {
     pub limit_joints: Vec<Written<String>>,
     /// `collision.ignore_links`.
     pub ignore_links: Vec<Written<String>>,
-    /// `collision.ignore_pairs`.
-    pub ignore_pairs: Vec<[Written<String>; 2]>,
+    /// `collision.ignore_pairs`; `Some(empty)`: only links and their parents.
+    pub ignore_pairs: Option<Vec<[Written<String>; 2]>>,
 }
 
 const LINKS: Shape = Shape::List { item: &Shape::Text, count: (0, usize::MAX), form: "a list of link names" };
@@ -167,7 +167,7 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn spec(&self) -> RobotSpec {
-        let collision = |key: &str| self.get("collision", key).map_or(&[][..], Node::items);
+        let pairs = |node: &Node| node.items().iter().filter_map(|p| self.names(Some(p)).try_into().ok()).collect();
         RobotSpec {
             name: self.root.get("name").and_then(Node::text).map(str::to_string),
             urdf: self.root.get("urdf").and_then(|n| Some(self.written(PathBuf::from(n.text()?), n))),
@@ -183,10 +183,7 @@ impl Reader<'_> {
                 .map(|(value, span)| Written { value, span: Some(span) })
                 .collect(),
             ignore_links: self.names(self.get("collision", "ignore_links")),
-            ignore_pairs: collision("ignore_pairs")
-                .iter()
-                .filter_map(|p| self.names(Some(p)).try_into().ok())
-                .collect(),
+            ignore_pairs: self.get("collision", "ignore_pairs").map(pairs),
         }
     }
 
@@ -293,8 +290,10 @@ collision:
         assert_eq!(spec.limits.joints["blade"].upper, Some(std::f64::consts::PI));
         assert_eq!(names(&spec.limit_joints), ["blade"]);
         assert_eq!(names(&spec.ignore_links), ["lidar"]);
-        assert_eq!(names(&spec.ignore_pairs[0]), ["base_link", "left_blade"]);
-        for written in spec.drive_left.iter().chain(&spec.limit_joints).chain(spec.ignore_pairs.iter().flatten()) {
+        assert_eq!(names(&spec.ignore_pairs.as_ref().expect("ignore_pairs")[0]), ["base_link", "left_blade"]);
+        for written in
+            spec.drive_left.iter().chain(&spec.limit_joints).chain(spec.ignore_pairs.iter().flatten().flatten())
+        {
             let span = written.span.as_ref().expect("a span");
             assert_eq!(span.source.text[span.range.clone()], written.value);
         }

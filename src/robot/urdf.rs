@@ -47,6 +47,9 @@ pub(super) fn read(name: &str, text: &str) -> Result<Urdf, Diagnostics> {
     let source = Arc::new(Source { name: name.into(), text: text.into() });
     let document = Document::parse(text).map_err(|error| syntax_error(&source, &error))?;
     check_depth(&source, &document)?;
+    if let Some(fault) = still_xacro(&source, &document) {
+        return Err(fault.into());
+    }
 
     let mut check = Check { source: &source, faults: Vec::new() };
     let root = document.root_element();
@@ -101,10 +104,34 @@ fn syntax_error(source: &Arc<Source>, error: &roxmltree::Error) -> Diagnostic {
     if matches!(error, roxmltree::Error::DtdDetected) {
         found.hint("a URDF needs no <!DOCTYPE> and no entities: remove them")
     } else if source.text.contains("xacro:") {
-        found.hint("this looks like xacro: run xacro first and name its output")
+        found.hint(expand(&source.name))
     } else {
         found
     }
+}
+
+/// A fault where elements are left that xacro would have replaced.
+fn still_xacro(source: &Arc<Source>, document: &Document) -> Option<Diagnostic> {
+    let foreign = |n: &Node| n.tag_name().namespace().is_some_and(|name| name.contains("xacro"));
+    let left: Vec<Node> = document.descendants().filter(|n| n.is_element() && foreign(n)).collect();
+    let first = left.first()?;
+    let message = format!(
+        "this is a xacro file, not yet a URDF: {} elements are for xacro, the first is <xacro:{}>",
+        left.len(),
+        first.tag_name().name()
+    );
+    let at = Check { source, faults: Vec::new() }.start(*first);
+    Some(Diagnostic::error("robot/xacro", message).at(&at).hint(expand(&source.name)))
+}
+
+/// The command that makes a URDF of a xacro file.
+fn expand(name: &str) -> String {
+    let stem = name.strip_suffix(".xacro").unwrap_or(name);
+    let (stem, own) = stem.strip_suffix(".urdf").map_or((stem, false), |s| (s, stem == name));
+    let out = if own { format!("{stem}.expanded.urdf") } else { format!("{stem}.urdf") };
+    format!(
+        "expand it first: `xacro {name} > {out}` (with ROS 2: `ros2 run xacro xacro …`; else `pip install xacro`), and name {out}"
+    )
 }
 
 /// Byte offset of a row and column (both from 1, columns in characters).
@@ -320,9 +347,12 @@ impl Check<'_> {
             Ok(v) if v.len() == count && v.iter().all(|v| v.is_finite() && v.abs() <= 1e9) => Some(v),
             _ => {
                 let what = if count == 1 { "one finite number".into() } else { format!("{count} finite numbers") };
-                let xacro = if attribute.value().contains("${") { "; a xacro file? Expand it first" } else { "" };
-                let message = format!("{key}=\"{}\": expected {what}{xacro}", attribute.value());
-                self.fault("robot/not-a-number", message, &self.attribute_span(&attribute));
+                let message = format!("{key}=\"{}\": expected {what}", attribute.value());
+                let mut fault = Diagnostic::error("robot/not-a-number", message).at(&self.attribute_span(&attribute));
+                if attribute.value().contains("${") {
+                    fault = fault.hint(format!("this looks like xacro; {}", expand(&self.source.name)));
+                }
+                self.faults.push(fault);
                 None
             }
         }

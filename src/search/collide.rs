@@ -195,9 +195,23 @@ impl<'a, const W: usize> Collider<'a, W> {
         }
     }
 
-    /// All postures.
+    /// All postures that are searched.
     pub fn all(&self) -> Bits<W> {
         self.all
+    }
+
+    /// Searches these postures only.
+    pub fn only(&mut self, postures: Bits<W>) {
+        self.all = postures;
+    }
+
+    /// Postures in which links of the robot touch each other.
+    pub fn touching(&self) -> Bits<W> {
+        let pairs = self.robot.self_pairs();
+        let mut out = Bits::EMPTY;
+        let touch = |p: &usize| self.robot.touching(&pairs, &self.grid.joints(*p)).is_some();
+        (0..self.grid.count()).filter(|_| !pairs.is_empty()).filter(touch).for_each(|p| out.insert(p));
+        out
     }
 
     /// Side of the map's cells, m.

@@ -123,21 +123,31 @@ pub fn search(
 }
 
 fn solve<const W: usize>(problem: Problem<'_>, grid: PostureGrid) -> Result<SearchPath, SearchError> {
-    let solver = match Solver::<W>::new(problem, grid.clone()) {
+    let mut solver = match Solver::<W>::new(problem, grid.clone()) {
         Ok(solver) => solver,
         Err(end) => return Err(explain::blocked::<W>(&problem, grid, end)),
     };
-    if let Some(path) = solver.guided() {
-        return Ok(path);
-    }
-    solver.on_the_lattice(astar::MOST_LABELS).map_err(|none| match none {
-        NoPath::Exhausted { core_clearances, closest, expanded } => {
-            explain::absent(&solver, &core_clearances, closest, expanded)
+    loop {
+        if let Some(path) = solver.guided() {
+            return Ok(path);
         }
-        NoPath::Marginal { expanded } => SearchError::Marginal { expanded },
-        NoPath::Limit { labels } => SearchError::Limit { labels },
-    })
+        let none = match solver.on_the_lattice(astar::MOST_LABELS) {
+            Ok(path) => return Ok(path),
+            Err(none) => none,
+        };
+        if !matches!(none, NoPath::Limit { .. }) && solver.let_links_touch() {
+            continue;
+        }
+        return Err(match none {
+            NoPath::Exhausted { core_clearances, closest, expanded } => {
+                explain::absent(&solver, &core_clearances, closest, expanded)
+            }
+            NoPath::Marginal { expanded } => SearchError::Marginal { expanded },
+            NoPath::Limit { labels } => SearchError::Limit { labels },
+        });
+    }
 }
+
 impl SearchPath {
     /// Appends a state; nothing where it is the last one, and only a longer last move where it goes on in a straight line.
     fn then_to(&mut self, state: SearchState, kind: SearchMove) {

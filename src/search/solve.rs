@@ -66,6 +66,8 @@ pub(super) struct Solver<'a, const W: usize> {
     pub core: Core,
     start_postures: Bits<W>,
     goal_postures: Bits<W>,
+    /// Postures left out because links of the robot touch in them.
+    touching: Bits<W>,
 }
 
 impl<'a, const W: usize> Solver<'a, W> {
@@ -73,11 +75,27 @@ impl<'a, const W: usize> Solver<'a, W> {
     /// The end that is blocked.
     pub fn new(problem: Problem<'a>, grid: PostureGrid) -> Result<Self, End> {
         let Problem { map, esdf, robot, query, options } = problem;
-        let collider = Collider::<W>::new(robot, esdf, map, options.clearance, grid);
-        let start_postures = free_postures(&collider, query.start, &query.start_joints).ok_or(End::Start)?;
-        let goal_postures = goal_postures(&collider, query).ok_or(End::Goal)?;
+        let mut collider = Collider::<W>::new(robot, esdf, map, options.clearance, grid);
+        let mut start_postures = free_postures(&collider, query.start, &query.start_joints).ok_or(End::Start)?;
+        let mut goal_postures = goal_postures(&collider, query).ok_or(End::Goal)?;
+        // Where an end leaves no other choice, samples in which links touch stay: the exact joint values may be apart.
+        let mut touching = collider.touching();
+        for postures in [&mut start_postures, &mut goal_postures] {
+            match postures.minus(touching) {
+                apart if apart.is_empty() => touching = touching.minus(*postures),
+                apart => *postures = apart,
+            }
+        }
+        collider.only(collider.all().minus(touching));
         let (lattice, core) = (Lattice::new(map), Core::new(robot));
-        Ok(Self { problem, collider, lattice, core, start_postures, goal_postures })
+        Ok(Self { problem, collider, lattice, core, start_postures, goal_postures, touching })
+    }
+
+    /// Takes the postures in which links touch back in; whether there were any. What comes of it the certificate judges, which names the
+    /// links where a search could only say that there is no way.
+    pub fn let_links_touch(&mut self) -> bool {
+        self.collider.only(self.collider.all().or(self.touching));
+        !std::mem::replace(&mut self.touching, Bits::EMPTY).is_empty()
     }
 
     /// The first that passes of the straight ways, those that count turns, and the guide's. None proves nothing.
@@ -188,7 +206,8 @@ impl<'a, const W: usize> Solver<'a, W> {
             }
             // At the lattice's own grain whatever the search got through passes, but for the tolerance of the checks.
             let lenient = (clearance - CHECK_TOLERANCE).max(0.0);
-            let lenient = Collider::<W>::new(robot, esdf, map, lenient, self.collider.grid.clone());
+            let mut lenient = Collider::<W>::new(robot, esdf, map, lenient, self.collider.grid.clone());
+            lenient.only(self.collider.all());
             if let Ok(path) = self.finish(&route, Grain::FINE, &lenient, expanded) {
                 return Ok(path);
             }

@@ -52,6 +52,16 @@ fn the_missions_that_are_shipped_compile_twice_to_the_same_bytes_and_pass_their_
 }
 
 #[test]
+fn real_robots_compile_their_missions() {
+    ["tracer", "limo", "turtlebot3_burger", "turtlebot3_waffle_pi", "tiago"].iter().for_each(|name| compiles(name));
+}
+
+#[test]
+fn a_lift_an_arm_and_a_wrist_pass_a_gap_and_reach_into_a_shelf() {
+    compiles("stretch");
+}
+
+#[test]
 fn a_robot_that_changes_shape_crosses_the_arch_bridges() {
     compiles("arch_bridges");
 }

@@ -1,7 +1,7 @@
 //! Shipped missions, cut anywhere: what was played and the stop are a command file that is certified like any other.
 
 use trajc::certify::{Goal, Task, certify};
-use trajc::cli::inputs;
+use trajc::inputs;
 use trajc::command::CommandTable;
 use trajc::pipeline;
 use trajc::play::Motion;

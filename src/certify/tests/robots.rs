@@ -10,7 +10,9 @@ use crate::command::{CommandRow, CommandTable};
 use crate::geom::{Aabb, Pose2};
 use crate::map::VoxelMap;
 use crate::mission::{Sampling, Unknown};
-use crate::robot::{BaseLimits, Body, BodyMotion, Convex, MotionLimits, MovingJoint, RobotModel, Shape};
+use crate::robot::{
+    BaseLimits, Body, BodyMotion, Convex, IgnoreReason, IgnoredPair, MotionLimits, MovingJoint, RobotModel, Shape,
+};
 
 pub(crate) const FREE: MotionLimits = MotionLimits { speed: None, acceleration: None, jerk: None };
 
@@ -42,6 +44,16 @@ pub(crate) fn bare_robot() -> RobotModel {
 pub(crate) fn with_shape(mut robot: RobotModel, body: usize, pose: Isometry3<f64>, convex: Convex) -> RobotModel {
     let link = format!("link_{}", robot.shapes.len());
     robot.shapes.push(Shape { link, body, pose, convex });
+    robot
+}
+
+/// Lets all links touch each other.
+pub(crate) fn ignoring_itself(mut robot: RobotModel) -> RobotModel {
+    let names: Vec<String> = robot.shapes.iter().map(|s| s.link.clone()).collect();
+    for (i, a) in names.iter().enumerate() {
+        let pair = |b: &String| IgnoredPair { links: [a.clone(), b.clone()], reason: IgnoreReason::Named };
+        robot.ignore_pairs.extend(names[i + 1..].iter().map(pair));
+    }
     robot
 }
 
@@ -179,8 +191,13 @@ fn any_convex() -> impl Strategy<Value = Convex> {
     ]
 }
 
-/// Up to three joints, one of them with a mimic, in any tree; one to four shapes.
+/// Up to three joints, one of them with a mimic, in any tree; one to four shapes, which may touch each other.
 pub(crate) fn any_robot() -> impl Strategy<Value = RobotModel> {
+    any_tangle().prop_map(ignoring_itself)
+}
+
+/// As [`any_robot`], but its links may not touch each other.
+pub(crate) fn any_tangle() -> impl Strategy<Value = RobotModel> {
     let axis = [-1.0..1.0, -1.0..1.0, 0.1..1.0f64];
     let body = (any_pose(0.15), axis, any::<prop::sample::Index>(), -2.0..2.0f64, -0.5..0.5f64);
     let bodies = prop::collection::vec((body, any::<prop::sample::Index>()), 0..4);

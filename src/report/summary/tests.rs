@@ -19,6 +19,7 @@ fn certificate() -> Certificate {
             obstacle: Some(Aabb { min: [4.0, 4.05, 0.25], max: [4.05, 4.1, 0.3] }),
             distance: 0.05231,
         }),
+        own_links: None,
         end_point_error: 4.2e-5,
         end_heading_error: Some(1.7e-5),
         limits: vec![
@@ -52,6 +53,7 @@ fn report() -> Report {
         track_width_m: 0.32,
         joints: vec![joint("blade", false)],
         shapes: 5,
+        ignored_pairs: Vec::new(),
     });
     report.trajectory = Some(TrajectoryPart {
         source: "optimised".into(),

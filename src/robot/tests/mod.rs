@@ -1,7 +1,10 @@
 //! Tests of the whole stage, and what they share.
 
 mod errors;
+mod init;
 mod kinematics;
+mod pairs;
+mod quirks;
 mod reaches;
 mod real_robots;
 
