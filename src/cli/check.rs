@@ -6,7 +6,7 @@ use super::inputs::commands::{self, LoadedCommands, Origin, Places};
 use super::terminal::Terminal;
 use crate::certify::Certificate;
 use crate::diag::Diagnostics;
-use crate::report::schema::{CertificatePart, LimitPart};
+use crate::report::schema::{CertificatePart, LimitPart, RobotPart};
 use crate::report::summary;
 
 /// Check a command file against its robot, map, limits and goal, without planning anything.
@@ -59,10 +59,9 @@ fn readable(loaded: &LoadedCommands, certificate: &Certificate) -> String {
     let verdict = if certificate.holds() { "all checks hold" } else { "CHECKS FAIL" };
     let mut out = format!("{}: {verdict}\n\n", loaded.file.path.display());
     summary::line(&mut out, "against", &against(loaded));
-    let joints = &loaded.world.robot.joints;
-    let prismatic = |name: &str| joints.iter().any(|j| j.name == name && j.prismatic);
+    let robot = RobotPart::from(&loaded.world.robot);
     let limits: Vec<LimitPart> = certificate.limits.iter().map(Into::into).collect();
-    summary::proof(&mut out, &certificate.into(), &limits, &prismatic);
+    summary::proof(&mut out, &certificate.into(), &limits, Some(&robot));
     for refusal in &certificate.refusals {
         summary::line(&mut out, "refused", &refusal.message);
     }

@@ -4,7 +4,7 @@ mod limits;
 
 use std::fmt::Write;
 
-use super::schema::{CertificatePart, LimitPart, Report, Status};
+use super::schema::{CertificatePart, LimitPart, Report, RobotPart, Status};
 use crate::certify::{END_ANGLE_TOLERANCE, END_POINT_TOLERANCE};
 pub use limits::table as limits_table;
 
@@ -45,7 +45,7 @@ fn certified(inputs: &SummaryInputs<'_>) -> String {
     let mut out = format!("{}: {}\n\n", inputs.mission, paint("CERTIFIED", 32, inputs.colour));
     motion(&mut out, report);
     if let Some(certificate) = &report.certificate {
-        proof(&mut out, certificate, &report.limits, &prismatic(report));
+        proof(&mut out, certificate, &report.limits, report.robot.as_ref());
     }
     path_error(&mut out, report);
     files(&mut out, inputs);
@@ -65,7 +65,7 @@ fn failed(inputs: &SummaryInputs<'_>) -> String {
     motion(&mut out, report);
     if let Some(certificate) = &report.certificate {
         clearance(&mut out, certificate);
-        limits(&mut out, &report.limits, &prismatic(report));
+        limits(&mut out, &report.limits, report.robot.as_ref());
     }
     files(&mut out, inputs);
     // The diagnostic follows.
@@ -73,16 +73,11 @@ fn failed(inputs: &SummaryInputs<'_>) -> String {
     out
 }
 
-/// Lines that tell what a certificate says. `prismatic`: which joints are measured in metres.
-pub fn proof(out: &mut String, certificate: &CertificatePart, peaks: &[LimitPart], prismatic: &dyn Fn(&str) -> bool) {
+/// Lines that tell what a certificate says. `robot` knows which joints are measured in metres.
+pub fn proof(out: &mut String, certificate: &CertificatePart, peaks: &[LimitPart], robot: Option<&RobotPart>) {
     clearance(out, certificate);
     goal(out, certificate);
-    limits(out, peaks, prismatic);
-}
-
-fn prismatic(report: &Report) -> impl Fn(&str) -> bool {
-    let joints = report.robot.as_ref().map_or(&[][..], |r| &r.joints);
-    move |name| joints.iter().any(|j| j.name == name && j.prismatic)
+    limits(out, peaks, robot);
 }
 
 /// Bold and in one of the terminal's eight colours.
@@ -183,8 +178,9 @@ pub fn goal_text(certificate: &CertificatePart) -> Option<String> {
     Some(format!("missed by {missed}; allowed: {allowed}"))
 }
 
-fn limits(out: &mut String, peaks: &[LimitPart], prismatic: &dyn Fn(&str) -> bool) {
-    let table = limits_table(peaks, prismatic);
+fn limits(out: &mut String, peaks: &[LimitPart], robot: Option<&RobotPart>) {
+    let joints = robot.map_or(&[][..], |robot| &robot.joints);
+    let table = limits_table(peaks, &|name| joints.iter().any(|j| j.name == name && j.prismatic));
     if table.is_empty() {
         return;
     }
