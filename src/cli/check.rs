@@ -59,8 +59,9 @@ fn readable(loaded: &LoadedCommands, certificate: &Certificate) -> String {
     let verdict = if certificate.holds() { "all checks hold" } else { "CHECKS FAIL" };
     let mut out = format!("{}: {verdict}\n\n", loaded.file.path.display());
     summary::line(&mut out, "against", &against(loaded));
+    let robot = RobotPart::from(&loaded.world.robot);
     let limits: Vec<LimitPart> = certificate.limits.iter().map(Into::into).collect();
-    summary::proof(&mut out, &certificate.into(), &limits, Some(&RobotPart::from(&loaded.world.robot)));
+    summary::proof(&mut out, &certificate.into(), &limits, Some(&robot));
     for refusal in &certificate.refusals {
         summary::line(&mut out, "refused", &refusal.message);
     }

@@ -74,7 +74,7 @@ fn failed(inputs: &SummaryInputs<'_>) -> String {
     out
 }
 
-/// Lines that tell what a certificate says.
+/// Lines that tell what a certificate says. `robot` knows which joints are measured in metres.
 pub fn proof(out: &mut String, certificate: &CertificatePart, peaks: &[LimitPart], robot: Option<&RobotPart>) {
     clearance(out, certificate);
     own_links(out, certificate, robot);
