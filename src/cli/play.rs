@@ -87,11 +87,11 @@ pub fn play(args: &PlayArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics>
     let file_step = table.sampling_time;
     let motion = Motion::new(motion::slowed(table, args.rate));
     let limits = Limits::new(&robot, &motion);
-    let (motion, first_time) = match args.start_at {
-        None => (motion, 0.0),
+    let (motion, first_row) = match args.start_at {
+        None => (motion, 0),
         Some(time) => from_within(&motion, &limits, time, file_step)?,
     };
-    let what = Play { motion: &motion, limits: &limits, first_time, file_step };
+    let what = Play { motion: &motion, limits: &limits, first_row, file_step };
     let world = sinks::World { robot: &robot, urdf: &inputs.urdf.text, table: motion.table() };
     let mut sink = sinks::open(&args.to, args.joints.as_ref(), &args.sinks, &world)?;
 
@@ -138,8 +138,8 @@ fn certified(args: &PlayArgs, loaded: &LoadedCommands, terminal: &mut Terminal) 
     Err(Diagnostic::failure("play/not-certified", message).hint(hint).into())
 }
 
-/// The motion from a time within, set off from rest, and its first time in the file's own.
-fn from_within(motion: &Motion, limits: &Limits, time: f64, file_step: f64) -> Result<(Motion, f64), Diagnostics> {
+/// The motion from a time within, set off from rest, and the row of the file whose time its first row has.
+fn from_within(motion: &Motion, limits: &Limits, time: f64, file_step: f64) -> Result<(Motion, i64), Diagnostics> {
     let table = motion.table();
     let rows = table.rows.len();
     let at = (time / file_step + 1e-9).floor() as usize;
@@ -162,8 +162,8 @@ fn from_within(motion: &Motion, limits: &Limits, time: f64, file_step: f64) -> R
     let ramp = begun.rows.len();
     let rows = begun.rows.into_iter().chain(table.rows[begun.joins..].iter().cloned()).collect();
     // Rows of the file have the file's own times.
-    let first_time = (begun.joins as f64 - ramp as f64) * file_step;
-    Ok((Motion::new(CommandTable { rows, ..table.clone() }), first_time))
+    let first_row = begun.joins as i64 - ramp as i64;
+    Ok((Motion::new(CommandTable { rows, ..table.clone() }), first_row))
 }
 
 fn not_begun(error: SinkError) -> Diagnostics {

@@ -14,8 +14,8 @@ pub struct Play<'a> {
     pub motion: &'a Motion,
     /// Within which a stop must stay.
     pub limits: &'a Limits,
-    /// Time of the first row as the file counts it, s.
-    pub first_time: f64,
+    /// The row of the file that the first row stands for, as far as time is concerned: row k has the time of the file's row `first_row + k`.
+    pub first_row: i64,
     /// The file's time that passes from row to row, s.
     pub file_step: f64,
 }
@@ -174,7 +174,7 @@ impl Player<'_> {
     fn send(&mut self, k: usize, at: f64) -> Result<(), SinkError> {
         let command = Command {
             sequence: k as u64,
-            time: self.what.first_time + k as f64 * self.what.file_step,
+            time: (self.what.first_row + k as i64) as f64 * self.what.file_step,
             row: &self.table.rows[k],
             twist: self.table.twist(k),
         };

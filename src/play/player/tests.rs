@@ -31,7 +31,7 @@ fn run(
         now: Box::new(move || now.now()),
         frame_time,
     };
-    let what = Play { motion: &motion, limits: &limits, first_time: 0.0, file_step: 0.01 };
+    let what = Play { motion: &motion, limits: &limits, first_row: 0, file_step: 0.01 };
     let outcome = play(&what, &mut recorder, &mut clock.clone(), &|| requests.get()).expect("ready");
     drop(recorder);
     let heard = heard.borrow().clone();
@@ -149,7 +149,7 @@ fn nothing_is_sent_when_asked_to_end_before_the_beginning() {
     let heard = Rc::new(RefCell::new(Heard::default()));
     let mut recorder =
         Recorder { heard: heard.clone(), on_command: Box::new(|_| Ok(())), now: Box::new(|| 0.0), frame_time: None };
-    let what = Play { motion: &motion, limits: &limits, first_time: 0.0, file_step: 0.01 };
+    let what = Play { motion: &motion, limits: &limits, first_row: 0, file_step: 0.01 };
     assert_eq!(play(&what, &mut recorder, &mut clock.clone(), &|| 1), Err(SinkError::Interrupted));
     assert!(heard.borrow().commands.is_empty());
 }

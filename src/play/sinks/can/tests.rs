@@ -60,7 +60,7 @@ fn run(base: Base) -> (Result<crate::play::Outcome, SinkError>, Vec<(f64, Frame)
     let clock = SimulatedClock::default();
     let base = Rc::new(RefCell::new(base));
     let mut sink = CanSink::new(Bus(base.clone(), clock.clone()), clock.clone());
-    let what = Play { motion: &motion, limits: &limits, first_time: 0.0, file_step: 0.01 };
+    let what = Play { motion: &motion, limits: &limits, first_row: 0, file_step: 0.01 };
     let outcome = play(&what, &mut sink, &mut clock.clone(), &|| 0);
     let heard = base.borrow().heard.clone();
     (outcome, heard)

@@ -59,7 +59,7 @@ fn run(hold: f64, requests: impl Fn(usize) -> usize) -> (Vec<Topic>, Vec<(usize,
     let sent = Sent::default();
     let transport = Kept { sent: sent.clone(), asks: true };
     let mut sink = TopicSink::new(transport, &topics, &robot, "<robot/>", &table);
-    let what = Play { motion: &motion, limits: &limits, first_time: 0.0, file_step: hold };
+    let what = Play { motion: &motion, limits: &limits, first_row: 0, file_step: hold };
     let count = sent.clone();
     let mut clock = SimulatedClock::default();
     let outcome = play(&what, &mut sink, &mut clock, &|| requests(count.borrow().len())).expect("ready");
