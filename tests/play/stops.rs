@@ -1,8 +1,8 @@
 //! Shipped missions, cut anywhere: what was played and the stop are a command file that is certified like any other.
 
 use trajc::certify::{Goal, Task, certify};
-use trajc::inputs;
 use trajc::command::CommandTable;
+use trajc::inputs;
 use trajc::pipeline;
 use trajc::play::Motion;
 use trajc::play::pace::{self, Limits};

@@ -111,6 +111,11 @@ fn proven(inputs: &PageInputs<'_>, certificate: &CertificatePart) -> Vec<(String
             format!("{}: {} is {} from {of}", instant(closest.time_s), escape(&closest.link), mm(closest.distance_m));
         out.push(("Closest approach".into(), text));
     }
+    if let Some(own) = certificate.own_links {
+        let pairs = counted(own.pairs_checked, "pair");
+        let verdict = if own.keep_apart { "never touch" } else { "are not shown to keep apart" };
+        out.push(("Own links".into(), format!("{pairs} that move against each other {verdict}")));
+    }
     let unlimited: Vec<&LimitPart> = inputs.report.limits.iter().filter(|row| row.limit.is_none()).collect();
     let limits = match (certificate.limits_hold, unlimited.len()) {
         (true, 0) => "no wheel and no joint passes its speed, acceleration, jerk or range".to_owned(),
@@ -149,8 +154,12 @@ fn unpromised(inputs: &PageInputs<'_>) -> Vec<String> {
         "<b>The model.</b> It speaks of the URDF, wheel radius and track width as given, and of what the map shows; what the map leaves out is not there.".to_owned(),
         "<b>Moving things.</b> Nothing moves but the robot.".to_owned(),
     ];
-    if inputs.robot.is_some_and(|r| r.shapes.len() > 1) {
-        out.push("<b>Its own links.</b> They are not checked against each other in this version.".into());
+    let ignored = inputs.report.robot.as_ref().map_or(0, |robot| robot.ignored_pairs.len());
+    if ignored > 0 {
+        let pairs = counted(ignored, "pair");
+        out.push(format!(
+            "<b>Links that touch by design.</b> {pairs} of its own links are not checked against each other."
+        ));
     }
     if inputs.map.is_none() {
         out.push("<b>Obstacles.</b> Without a map nothing is known of any.".into());
