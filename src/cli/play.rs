@@ -5,6 +5,7 @@ mod sinks;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
 
 use super::terminal::Terminal;
 use crate::command::CommandTable;
@@ -13,6 +14,9 @@ use crate::inputs::commands::{self, LoadedCommands, Places};
 use crate::play::address::Address;
 use crate::play::pace::{self, Limits};
 use crate::play::{self, Ending, MonotonicClock, Motion, Outcome, Play, Reason, SinkError, motion, realtime};
+
+/// Signals that come this close to each other are one.
+const ONE_REQUEST: Duration = Duration::from_millis(100);
 
 /// Play a command file in real time to a robot or whoever listens.
 ///
@@ -97,8 +101,13 @@ pub fn play(args: &PlayArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics>
 
     let requests = Arc::new(AtomicUsize::new(0));
     let counted = requests.clone();
+    let mut last: Option<Instant> = None;
     ctrlc::set_handler(move || {
-        counted.fetch_add(1, Ordering::SeqCst);
+        // Wrappers such as `timeout` signal a process and its group: one request, twice.
+        if last.is_none_or(|last| last.elapsed() > ONE_REQUEST) {
+            counted.fetch_add(1, Ordering::SeqCst);
+        }
+        last = Some(Instant::now());
     })
     .map_err(|error| Diagnostic::error("play/signals", format!("signals cannot be handled: {error}")))?;
     let rows = motion.table().rows.len();

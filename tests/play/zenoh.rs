@@ -7,6 +7,9 @@ use zenoh::{Config, Wait};
 
 use super::*;
 
+/// Payload and attachment.
+type Message = (Vec<u8>, Vec<u8>);
+
 const TWIST: &str =
     "geometry_msgs::msg::dds_::TwistStamped_/RIHS01_5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64";
 
@@ -24,7 +27,7 @@ fn a_router_gets_every_command_under_rmw_zenohs_key_with_its_attachment_and_toke
         config.insert_json5(key, &value).expect("a setting");
     }
     let session = zenoh::open(config).wait().expect("a router");
-    let heard: Arc<Mutex<Vec<(Vec<u8>, Vec<u8>)>>> = Arc::default();
+    let heard: Arc<Mutex<Vec<Message>>> = Arc::default();
     let tokens: Arc<Mutex<Vec<String>>> = Arc::default();
     let (into, known) = (heard.clone(), tokens.clone());
     let commands = session.declare_subscriber(format!("7/cmd_vel/{TWIST}")).callback(move |sample| {

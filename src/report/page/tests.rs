@@ -11,7 +11,9 @@ use crate::geom::Pose2;
 use crate::mission::{Sampling, Unknown};
 use crate::report::schema::{InputFile, InputsPart};
 use crate::report::{Metrics, PathErrorRow};
-use crate::robot::{BaseLimits, Body, BodyMotion, Convex, MotionLimits, MovingJoint, Shape};
+use crate::robot::{
+    BaseLimits, Body, BodyMotion, Convex, IgnoreReason, IgnoredPair, MotionLimits, MovingJoint, Shape,
+};
 
 /// What a user may call things.
 const HOSTILE: &str = "</script><script>alert('1')</script><!-- \"&amp;{{data}}\u{2028}";
@@ -62,8 +64,13 @@ fn robot(joint: &str) -> RobotModel {
             eta: 0.1,
             min_speed: 0.01,
         },
-        ignore_pairs: Vec::new(),
+        // They lie in one another, as far as this page is concerned by design.
+        ignore_pairs: [["base", joint], ["base", "drum"], [joint, "drum"]].map(by_design).to_vec(),
     }
+}
+
+fn by_design(links: [&str; 2]) -> IgnoredPair {
+    IgnoredPair { links: links.map(str::to_owned), reason: IgnoreReason::Named }
 }
 
 /// Speeds up, turns, moves both joints, slows down.

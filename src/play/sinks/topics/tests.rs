@@ -9,7 +9,9 @@ use crate::play::clock::SimulatedClock;
 use crate::play::fixtures::{ready, smooth, table, tight_robot};
 use crate::play::{Play, play};
 
-type Sent = Rc<RefCell<Vec<(usize, Vec<u8>)>>>;
+/// Index of a topic, and a message.
+type Message = (usize, Vec<u8>);
+type Sent = Rc<RefCell<Vec<Message>>>;
 
 /// Keeps messages; asks again for topic 0 once.
 struct Kept {
@@ -50,7 +52,7 @@ fn point_times(message: &[u8]) -> Vec<f64> {
     points.expect("points")
 }
 
-fn run(hold: f64, requests: impl Fn(usize) -> usize) -> (Vec<Topic>, Vec<(usize, Vec<u8>)>, usize) {
+fn run(hold: f64, requests: impl Fn(usize) -> usize) -> (Vec<Topic>, Vec<Message>, usize) {
     let speeds = [smooth(&[3.0, 2.0], 20, [6, 4]), smooth(&[3.0, 2.5], 20, [6, 4]), smooth(&[0.3, -0.3], 20, [6, 4])];
     let table = table(&speeds, hold);
     let robot = tight_robot(&table);
