@@ -146,6 +146,7 @@ impl From<&IgnoredPair> for IgnoredPairPart {
             IgnoreReason::Named => "named",
             IgnoreReason::Always => "always_touch",
             IgnoreReason::Telescope => "telescope",
+            IgnoreReason::AtRest => "touch_at_rest",
         };
         Self { links: pair.links.clone(), reason: reason.into() }
     }

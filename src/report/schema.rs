@@ -132,7 +132,8 @@ pub struct RobotPart {
 pub struct IgnoredPairPart {
     /// URDF links.
     pub links: [String; 2],
-    /// `joined`: by a joint; `named`: in robot.yaml; `always_touch`: in every posture; `telescope`: tubes of one.
+    /// `joined`: by a joint; `named`: in robot.yaml; `always_touch`: in every posture; `telescope`: tubes of one; `touch_at_rest`:
+    /// with all joints at rest, where robot.yaml names none.
     pub reason: String,
 }
 

@@ -168,10 +168,15 @@ pub fn clearance_text(certificate: &CertificatePart) -> String {
 fn own_links(out: &mut String, certificate: &CertificatePart, robot: Option<&RobotPart>) {
     let ignored = robot.map_or(&[][..], |robot| &robot.ignored_pairs);
     let count = |reason: &str| ignored.iter().filter(|pair| pair.reason == reason).count();
-    let left_out = [("named", "named in robot.yaml"), ("always_touch", "touch always"), ("telescope", "telescope")]
-        .iter()
-        .filter_map(|(reason, words)| Some(count(reason)).filter(|n| *n > 0).map(|n| format!("{n} {words}")))
-        .collect::<Vec<_>>();
+    let left_out = [
+        ("named", "named in robot.yaml"),
+        ("always_touch", "touch always"),
+        ("telescope", "telescope"),
+        ("touch_at_rest", "touch at rest"),
+    ]
+    .iter()
+    .filter_map(|(reason, words)| Some(count(reason)).filter(|n| *n > 0).map(|n| format!("{n} {words}")))
+    .collect::<Vec<_>>();
     let left_out = if left_out.is_empty() { String::new() } else { format!("; not checked: {}", left_out.join(", ")) };
     let said = match certificate.own_links {
         Some(own) if own.keep_apart => format!("{} kept apart{left_out}", counted(own.pairs_checked, "pair")),

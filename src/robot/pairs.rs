@@ -1,9 +1,10 @@
 //! Which links are checked against each other, and which are not.
 //!
 //! A link and its parent are never checked: a joint's two sides overlap by design. Beyond that robot.yaml's `collision.ignore_pairs`
-//! decides. Without it two more kinds are left out, and listed in every report: links that touch in every posture, of which no motion
-//! could be certified; and the tubes of a telescope that touch with every joint at rest, one being inside the other. Links that touch in
-//! some postures are checked, even if they do so at rest.
+//! decides. Without it three more kinds are left out, and listed in every report: links that touch in every posture, of which no motion
+//! could be certified; the tubes of a telescope that touch with every joint at rest, one being inside the other; and whatever else
+//! touches at rest, a posture that robots are drawn in and can be in, so that shapes drawn too large are the likelier reason. `robot
+//! init` writes down the first two kinds only, and asks for a look at the third.
 
 use std::collections::BTreeSet;
 
@@ -42,6 +43,8 @@ pub enum IgnoreReason {
     Always,
     /// They touch at rest, and are parts of one telescope: slides along one line, each on the one before.
     Telescope,
+    /// They touch with every joint at rest, and robot.yaml has no `collision.ignore_pairs`.
+    AtRest,
 }
 
 /// Pairs that are not checked, in the order of their shapes.
@@ -83,7 +86,17 @@ pub(super) fn ignored(
             for (joint, index) in own.joints.iter_mut().zip(&roles.moving) {
                 [joint.lower, joint.upper] = joints::range(urdf, *index);
             }
-            ignored.extend(by_design(&own));
+            own.ignore_pairs.extend(by_design(&own));
+            let rest: Vec<f64> = own.joints.iter().map(|j| at_rest([j.lower, j.upper])).collect();
+            let poses = own.shape_poses(&rest);
+            for [a, b] in own.self_pairs() {
+                let links = [a, b].map(|shape| own.shapes[shape].link.clone());
+                let new = !own.ignore_pairs.iter().any(|known| known.links == links);
+                if new && touch(&own.shapes[a], &poses[a], &own.shapes[b], &poses[b]) {
+                    own.ignore_pairs.push(IgnoredPair { links, reason: IgnoreReason::AtRest });
+                }
+            }
+            ignored = own.ignore_pairs;
         }
     }
     ignored
