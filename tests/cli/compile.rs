@@ -155,7 +155,7 @@ fn trajectory_json_holds_the_rows_of_the_csv_file_and_nothing_else() {
     assert!(!sandbox.exists("out/a/commands.csv"));
     sandbox.edit("missions/a.yaml", "x_m: 3.4", "x_m: 2.0");
     sandbox.run(&["compile", "missions/a.yaml", "--format", "trajectory.json"]).expect(1);
-    assert_eq!(sandbox.list("out/a"), ["report.json", "timings.json"]);
+    assert_eq!(sandbox.list("out/a"), ["report.html", "report.json", "timings.json"]);
 }
 
 #[test]
