@@ -254,6 +254,17 @@ struct Made {
     certificate: Certificate,
 }
 
+/// How a try of the optimiser goes about it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Look {
+    /// From the path.
+    First,
+    /// More closely, from the motion of the try before.
+    Again,
+    /// More closely, from the path.
+    Closer,
+}
+
 /// Searches and optimises until something is certified; the search's own path is the last try.
 fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, compile: &CompileOptions) -> Result<Made, Diagnostics> {
     let asked = compile.parameterisation.unwrap_or(finish.mission.parameterisation);
@@ -277,24 +288,29 @@ fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, compile: &Compil
     }
     // Where one parameterisation fails at every margin, the other may not.
     let other = (asked == Parameterisation::ArcLength).then_some(Parameterisation::Flat);
-    // A motion that misses its clearance by little is looked at more closely before it is asked for more.
+    // A motion that misses its clearance by little is looked at more closely, then from the beginning, then asked for more.
     let [least, ..] = OPTIMISER_MARGINS;
     let of = |p: Parameterisation| match p {
-        Parameterisation::Flat => OPTIMISER_MARGINS.map(|margin| (p, margin, false)).to_vec(),
+        Parameterisation::Flat => OPTIMISER_MARGINS.map(|margin| (p, margin, Look::First)).to_vec(),
         Parameterisation::ArcLength => {
-            let closer = OPTIMISER_MARGINS.map(|margin| (p, margin, true));
-            [(p, least, false)].into_iter().chain(closer).collect()
+            let closer = OPTIMISER_MARGINS.map(|margin| (p, margin, Look::Closer));
+            [(p, least, Look::First), (p, least, Look::Again)].into_iter().chain(closer).collect()
         }
     };
+    let mut refused: Option<Trajectory> = None;
     let tries = [asked].into_iter().chain(other).flat_map(of);
-    for (parameterisation, margin, closer) in tries {
+    for (parameterisation, margin, look) in tries {
         let usual = if compile.spins { OptimizeOptions::default() } else { OptimizeOptions::without_spins() };
         let clearance = mission.clearance + margin;
         let mut options = OptimizeOptions { parameterisation, clearance, dense: compile.dense, ..usual };
-        if closer {
+        if look != Look::First {
             options.steer = options.steer.closer();
         }
-        let trajectory = run.stage("optimize", || optimize::optimize(&path, &field, robot, &options));
+        let trajectory = run.stage("optimize", || match refused.take().filter(|_| look == Look::Again) {
+            Some(refused) => optimize::resume(&path, &field, robot, &options, &refused),
+            None => optimize::optimize(&path, &field, robot, &options),
+        });
+        refused = Some(trajectory.clone());
         // A trajectory that no law can time is one more reason to go on to the next try.
         if let Some(made) = finish.certify(run, trajectory).ok().filter(|made| made.certificate.holds()) {
             return Ok(made);

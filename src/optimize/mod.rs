@@ -38,6 +38,25 @@ pub fn optimize(path: &SearchPath, esdf: &Esdf, robot: &RobotModel, options: &Op
     optimize_in(path, esdf, robot, options)
 }
 
+/// Smooths a path, going on from a trajectory that [`optimize`] made of it and that was refused: with other options, but not from the
+/// beginning. Takes the polynomials of heading and arc length alone; from another trajectory it is [`optimize`].
+pub fn resume(
+    path: &SearchPath,
+    esdf: &Esdf,
+    robot: &RobotModel,
+    options: &OptimizeOptions,
+    refused: &Trajectory,
+) -> Trajectory {
+    let from = match &refused.legs[..] {
+        [Leg::Steer(leg)] => Some(leg),
+        _ => None,
+    };
+    match options.parameterisation {
+        Parameterisation::Flat => optimize_flat(path, esdf, robot, options),
+        Parameterisation::ArcLength => steer::optimize_steered(path, esdf, robot, options, from),
+    }
+}
+
 /// [`optimize`] in any distance field.
 pub fn optimize_in<F: DistanceField>(
     path: &SearchPath,
@@ -47,7 +66,7 @@ pub fn optimize_in<F: DistanceField>(
 ) -> Trajectory {
     match options.parameterisation {
         Parameterisation::Flat => optimize_flat(path, field, robot, options),
-        Parameterisation::ArcLength => steer::optimize_steered(path, field, robot, options),
+        Parameterisation::ArcLength => steer::optimize_steered(path, field, robot, options, None),
     }
 }
 

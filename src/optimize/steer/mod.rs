@@ -87,12 +87,14 @@ const GAP_TOLERANCE: f64 = 1e-9;
 const END_TOLERANCE: f64 = 1e-8;
 const END_ROUNDS: usize = 4;
 
-/// Smooths a path as one motion from its first state to its last.
+/// Smooths a path as one motion from its first state to its last, beginning with a motion that was made of the same path, if there is
+/// one.
 pub fn optimize_steered<F: DistanceField>(
     path: &SearchPath,
     field: &F,
     robot: &RobotModel,
     options: &OptimizeOptions,
+    from: Option<&SteerLeg>,
 ) -> Trajectory {
     let limits = Limits::new(robot, 1.0);
     let Some(first) = guess(path, &limits) else {
@@ -111,9 +113,12 @@ pub fn optimize_steered<F: DistanceField>(
         clearance_unit: options.clearance_scale,
     };
     let layout = first.layout;
-    let counts: Vec<usize> = (0..layout.pieces).map(|k| samples(layout, k, &first.x, own)).collect();
-    let mut problem = Problem::new(robot, field, clearance, first.directions, first.fixed, &counts, weights);
     let mut x = first.x;
+    if let Some(leg) = from {
+        take_over(layout, leg, &first.fixed, &mut x);
+    }
+    let counts: Vec<usize> = (0..layout.pieces).map(|k| samples(layout, k, &x, own)).collect();
+    let mut problem = Problem::new(robot, field, clearance, first.directions, first.fixed, &counts, weights);
     let solver =
         SolverOptions { max_iterations: own.max_iterations, tolerance: own.tolerance, gap_tolerance: GAP_TOLERANCE };
     let forwards = path.moves.iter().all(|step| *step != SearchMove::Reverse);
@@ -153,6 +158,34 @@ pub fn optimize_steered<F: DistanceField>(
     let ending = if solved.converged { Ending::Converged } else { Ending::IterationLimit };
     let outcome = OptimiserOutcome { pieces: layout.pieces, iterations: solved.iterations, ending, cost: solved.cost };
     trajectory(Leg::Steer(leg), outcome)
+}
+
+/// Sets the unknowns that are free to those of a motion with the same pieces; leaves them where it has others.
+fn take_over(layout: Layout, leg: &SteerLeg, fixed: &[bool], x: &mut [f64]) {
+    let pieces = &leg.curve.pieces;
+    let fits = pieces.len() == layout.pieces && pieces.iter().all(|p| p.coefficients.len() == layout.dimensions);
+    let Some(exact) = SteeredCurve::new(leg).ok().filter(|_| fits) else { return };
+    let mut set = |at: usize, value: f64| {
+        if !fixed[at] {
+            x[at] = value;
+        }
+    };
+    let mut time = 0.0;
+    for node in 0..=layout.pieces {
+        let place = exact.place(time);
+        for dimension in 0..layout.dimensions {
+            for (order, value) in exact.jet(dimension, place).into_iter().take(hermite::ORDERS).enumerate() {
+                set(layout.state(node, dimension, order), value);
+            }
+        }
+        let pose = exact.pose(place);
+        set(layout.position(node), pose.x);
+        set(layout.position(node) + 1, pose.y);
+        if let Some(piece) = pieces.get(node) {
+            set(layout.duration(node), piece.duration.ln());
+            time += piece.duration;
+        }
+    }
 }
 
 /// How often a piece is looked at: an even number.

@@ -206,7 +206,7 @@ fn points_linearised_at_a_place_move_as_they_say() {
 
 fn steer(path: &SearchPath, field: &Boxes, robot: &RobotModel) -> (SteerLeg, OptimiserOutcome) {
     let options = OptimizeOptions { clearance: 0.03, ..Default::default() };
-    let trajectory = optimize_steered(path, field, robot, &options);
+    let trajectory = optimize_steered(path, field, robot, &options, None);
     let [Leg::Steer(leg)] = &trajectory.legs[..] else { panic!("one leg") };
     (leg.clone(), trajectory.optimiser.expect("optimised"))
 }
@@ -274,6 +274,32 @@ fn a_robot_that_changes_shape_passes_a_gap() {
 }
 
 #[test]
+fn a_motion_that_is_taken_over_is_the_same_and_hardly_changes() {
+    let (path, field) = mixed(1);
+    let robot = robot(1);
+    let (leg, outcome) = steer(&path, &field, &robot);
+    let first = guess(&path, &Limits::new(&robot, 1.0)).expect("it moves");
+    let mut x = first.x.clone();
+    take_over(first.layout, &leg, &first.fixed, &mut x);
+    let same = curve(first.layout, &x);
+    for (a, b) in same.pieces.iter().zip(&leg.curve.pieces) {
+        assert!((a.duration - b.duration).abs() < 1e-9);
+        let values = |p: &Piece| p.coefficients.concat();
+        assert!(values(a).iter().zip(values(b)).all(|(a, b)| (a - b).abs() < 1e-6 * (1.0 + b.abs())));
+    }
+    let options = OptimizeOptions { clearance: 0.03, ..Default::default() };
+    let again = optimize_steered(&path, &field, &robot, &options, Some(&leg));
+    let after = again.optimiser.expect("optimised");
+    assert!(after.iterations < outcome.iterations / 2, "{} of {}", after.iterations, outcome.iterations);
+    assert!((after.cost / outcome.cost - 1.0).abs() < 0.01, "{} {}", after.cost, outcome.cost);
+    // One of other pieces is left alone.
+    let mut other = first.x.clone();
+    let short = SteerLeg { curve: PiecewisePoly { pieces: leg.curve.pieces[1..].to_vec() }, ..leg };
+    take_over(first.layout, &short, &first.fixed, &mut other);
+    assert_eq!(other, first.x);
+}
+
+#[test]
 fn spins_cusps_and_joints_alone_are_part_of_one_motion() {
     let (path, _) = mixed(1);
     let robot = robot(1);
@@ -294,7 +320,7 @@ fn a_straight_line_in_the_open_takes_little_more_than_the_trapezoid() {
     let robot = robot(0);
     let mut options = OptimizeOptions::default();
     options.steer.smoothness = 0.05;
-    let trajectory = optimize_steered(&path, &Boxes(vec![]), &robot, &options);
+    let trajectory = optimize_steered(&path, &Boxes(vec![]), &robot, &options, None);
     let [Leg::Steer(leg)] = &trajectory.legs[..] else { panic!("one leg") };
     // 6 m at 0.5 m/s with ramps of 1 s, and 0.05 s for the jerk of 10 m/s^3.
     let time = leg.curve.duration();
@@ -305,10 +331,10 @@ fn a_straight_line_in_the_open_takes_little_more_than_the_trapezoid() {
 fn a_path_that_goes_nowhere_and_a_field_of_nans_are_survived() {
     let state = crate::search::SearchState { pose: Pose2::new(1.0, 2.0, 3.0), joints: vec![0.5] };
     let nowhere = SearchPath { states: vec![state], moves: Vec::new(), expanded: 0 };
-    let trajectory = optimize_steered(&nowhere, &Boxes(vec![]), &robot(1), &OptimizeOptions::default());
+    let trajectory = optimize_steered(&nowhere, &Boxes(vec![]), &robot(1), &OptimizeOptions::default(), None);
     assert!(matches!(&trajectory.legs[..], [Leg::Still(_)]));
     let path = path(0, &[(0.0, 2.0, 0.0), (0.5, 0.0, 0.0), (0.0, 2.0, 0.0)]);
-    let trajectory = optimize_steered(&path, &Broken, &robot(0), &OptimizeOptions::default());
+    let trajectory = optimize_steered(&path, &Broken, &robot(0), &OptimizeOptions::default(), None);
     let [Leg::Steer(leg)] = &trajectory.legs[..] else { panic!("one leg") };
     assert!(leg.curve.pieces.iter().flat_map(|p| p.coefficients.iter().flatten()).all(|c| c.is_finite()));
 }

@@ -11,9 +11,7 @@ use crate::geom::Pose2;
 use crate::mission::{Sampling, Unknown};
 use crate::report::schema::{InputFile, InputsPart};
 use crate::report::{Metrics, PathErrorRow};
-use crate::robot::{
-    BaseLimits, Body, BodyMotion, Convex, IgnoreReason, IgnoredPair, MotionLimits, MovingJoint, Shape,
-};
+use crate::robot::{BaseLimits, Body, BodyMotion, Convex, IgnoreReason, IgnoredPair, MotionLimits, MovingJoint, Shape};
 
 /// What a user may call things.
 const HOSTILE: &str = "</script><script>alert('1')</script><!-- \"&amp;{{data}}\u{2028}";
