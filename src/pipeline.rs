@@ -135,7 +135,7 @@ pub struct World {
 /// Clearance beyond what must be certified that the search asks for first, m: what held commands may leave of a path.
 pub const SEARCH_MARGIN: f64 = 2e-3;
 /// Clearance beyond what must be certified that the optimiser aims at, m, one try after the other.
-pub const OPTIMISER_MARGINS: [f64; 3] = [0.01, 0.02, 0.04];
+pub const OPTIMISER_MARGINS: [f64; 3] = [0.013, 0.02, 0.04];
 
 /// Collects figures while the stages run.
 struct Run<'a> {

@@ -4,7 +4,7 @@ use crate::mission::Sampling;
 use crate::retime::MotionProfile;
 use crate::robot::RobotModel;
 
-use super::limits::{ROUNDING, needed_slow_down};
+use super::limits::{ROUNDING, differences, needed_slow_down};
 use super::{CommandError, CommandRow, CommandTable, SampleOptions, end_point, tracked};
 
 /// A replay that ends farther from the plan's end is corrected, m; half of what the certificate allows.
@@ -104,7 +104,7 @@ fn sample_tracked(
                 let aim = (closeness * mean.sampling_time).min(CLOSE);
                 let mut corrected = CommandTable { sampling: Sampling::Tracked, ..table.clone() };
                 let Some(share) = tracked::correct(&mut corrected, robot, aim) else { continue };
-                if needed_slow_down(&corrected, robot) <= 1.0 {
+                if needed_slow_down(&corrected, robot) <= 1.0 && turns_as_gently(&corrected, &table, robot) {
                     if share <= CLOSE {
                         return Ok(Some(corrected));
                     }
@@ -116,6 +116,14 @@ fn sample_tracked(
         rows = (rows + 1.0).max((rows * slow_down * (1.0 - ROUNDING)).ceil());
     }
     Ok(second_best)
+}
+
+/// Whether corrections ask for no more angular acceleration than the plan's limit of it, or than was there before. Wheels keep their limits
+/// with more, but no plan should promise one thing and command another.
+fn turns_as_gently(corrected: &CommandTable, before: &CommandTable, robot: &RobotModel) -> bool {
+    let peak =
+        |table: &CommandTable| differences((0..table.rows.len()).map(|k| table.twist(k).1), table.sampling_time)[1];
+    peak(corrected) <= peak(before).max(robot.base.angular_acceleration) * (1.0 + ROUNDING)
 }
 
 /// Samples a profile without slow-down and without correction: what the sampling alone does to a path.
