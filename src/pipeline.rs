@@ -135,7 +135,9 @@ pub struct World {
 /// Clearance beyond what must be certified that the search asks for first, m: what held commands may leave of a path.
 pub const SEARCH_MARGIN: f64 = 2e-3;
 /// Clearance beyond what must be certified that the optimiser aims at, m, one try after the other.
-pub const OPTIMISER_MARGINS: [f64; 3] = [0.013, 0.02, 0.04];
+pub const OPTIMISER_MARGINS: [f64; 3] = [0.01, 0.02, 0.04];
+/// The same at first where the optimiser looks at a motion only now and then.
+const FIRST_MARGIN: f64 = 0.013;
 
 /// Collects figures while the stages run.
 struct Run<'a> {
@@ -289,12 +291,11 @@ fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, compile: &Compil
     // Where one parameterisation fails at every margin, the other may not.
     let other = (asked == Parameterisation::ArcLength).then_some(Parameterisation::Flat);
     // A motion that misses its clearance by little is looked at more closely, then from the beginning, then asked for more.
-    let [least, ..] = OPTIMISER_MARGINS;
     let of = |p: Parameterisation| match p {
         Parameterisation::Flat => OPTIMISER_MARGINS.map(|margin| (p, margin, Look::First)).to_vec(),
         Parameterisation::ArcLength => {
             let closer = OPTIMISER_MARGINS.map(|margin| (p, margin, Look::Closer));
-            [(p, least, Look::First), (p, least, Look::Again)].into_iter().chain(closer).collect()
+            [(p, FIRST_MARGIN, Look::First), (p, FIRST_MARGIN, Look::Again)].into_iter().chain(closer).collect()
         }
     };
     let mut refused: Option<Trajectory> = None;

@@ -42,8 +42,7 @@ impl Esdf {
         let Some((at, [ux, uy, _])) = self.inside([foot[0], foot[1], self.origin[2]]) else {
             return self.least_sampled(foot, rise);
         };
-        // Not `>`: NaN is looked at point by point.
-        if !(low <= high) {
+        if low > high {
             return self.least_sampled(foot, rise);
         }
         let most = self.nodes[2] - 2;

@@ -40,7 +40,7 @@ fn each_row_is_a_datagram_with_the_files_own_columns() {
     let sandbox = compiled();
     let (socket, to) = receiver();
     let rows = rows(&sandbox);
-    let from = rows.len() / 2;
+    let from = rows.len() / 4;
     let start_at = rows[from]["time_s"].to_string();
     let child = start(&sandbox, &["play", "out/a/commands.csv", "--to", &to, "--start-at", &start_at, "--json"]);
     let mut heard = vec![next(&socket)];
