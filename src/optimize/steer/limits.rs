@@ -7,6 +7,11 @@ use super::problem::Problem;
 /// Backing up weighs as much as exceeding the speed limit by so many times as much.
 const BACKWARDS: f64 = 10.0;
 
+/// Joints are kept off the ends of their range by this share of half of it: the penalty is soft, the range is not.
+const INSET: f64 = 0.02;
+/// The share of half a joint's range by which a position beyond counts like a speed of twice its limit.
+const STIFF_PART: f64 = 0.2;
+
 impl<F> Problem<'_, F> {
     /// Limits of base and wheels: each is linear in one derivative of heading and arc length. At rest the speed is what it is, and
     /// the jerk must not point backwards.
@@ -105,13 +110,15 @@ impl<F> Problem<'_, F> {
                     row(order, value.signum() / bound, value.abs() / bound - 1.0, 1.0);
                 }
             }
-            // Positions have no natural size; half the range is it, as a limit's distance from the middle. Unbounded: none.
+            // Positions have no natural size; a part of half the range is it. Unbounded: none.
             let half_range = 0.5 * (limits.upper - limits.lower);
-            let size = if half_range.is_finite() && half_range > 1e-6 { half_range } else { 1.0 };
-            if unit[0] > limits.upper {
-                row(0, 1.0 / size, (unit[0] - limits.upper) / size, 0.0);
-            } else if unit[0] < limits.lower {
-                row(0, -1.0 / size, (limits.lower - unit[0]) / size, 0.0);
+            let bounded = half_range.is_finite() && half_range > 1e-6;
+            let (inset, size) = if bounded { (INSET * half_range, STIFF_PART * half_range) } else { (0.0, 1.0) };
+            let (lower, upper) = (limits.lower + inset, limits.upper - inset);
+            if unit[0] > upper {
+                row(0, 1.0 / size, (unit[0] - upper) / size, 0.0);
+            } else if unit[0] < lower {
+                row(0, -1.0 / size, (lower - unit[0]) / size, 0.0);
             }
         }
         cost
