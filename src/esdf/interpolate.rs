@@ -12,6 +12,24 @@ struct Place {
     beyond: [f64; 3],
 }
 
+/// Least distance at the ends of `steps` equal parts of an upright line of `rise` m from `foot` up, and its gradient by x and y.
+pub fn least_of_points(
+    foot: [f64; 3],
+    rise: f64,
+    steps: usize,
+    distance_gradient: impl Fn([f64; 3]) -> (f64, [f64; 3]),
+) -> (f64, [f64; 3]) {
+    let mut least = (f64::INFINITY, [0.0; 3]);
+    for k in 0..=steps {
+        let z = foot[2] + rise * k as f64 / steps as f64;
+        let (distance, [x, y, _]) = distance_gradient([foot[0], foot[1], z]);
+        if distance < least.0 {
+            least = (distance, [x, y, 0.0]);
+        }
+    }
+    least
+}
+
 impl Esdf {
     /// Distance at a point by trilinear interpolation, m: positive outside, negative inside, to the obstacles' surface.
     /// At the nodes exact; between them within sqrt(3)/2 of a cell. Beyond the grid: sideways negative where unknown space
@@ -82,15 +100,7 @@ impl Esdf {
     #[cold]
     fn least_sampled(&self, foot: [f64; 3], rise: f64) -> (f64, [f64; 3]) {
         let steps = (rise * self.inverse_resolution).ceil().max(1.0);
-        let mut least = (f64::INFINITY, [0.0; 3]);
-        for k in 0..=steps as usize {
-            let z = foot[2] + rise * k as f64 / steps;
-            let (distance, [x, y, _]) = self.distance_gradient([foot[0], foot[1], z]);
-            if distance < least.0 {
-                least = (distance, [x, y, 0.0]);
-            }
-        }
-        least
+        least_of_points(foot, rise, steps as usize, |p| self.distance_gradient(p))
     }
 
     /// Lower corner of the cell and place in it, for points in the grid but its upper faces.

@@ -14,6 +14,8 @@ mod transform;
 use crate::map::VoxelMap;
 use crate::mission::Unknown;
 
+pub use interpolate::least_of_points;
+
 /// Signed Euclidean distance at the corners of the map's cells, m. Node (i, j, k) lies at
 /// `origin + resolution * (i, j, k)`; there are `dims + 1` nodes along each axis of the map.
 pub struct Esdf {

@@ -6,6 +6,7 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use super::Judge;
+use crate::esdf::least_of_points;
 use crate::optimize::contour::{Contour, Reach};
 use crate::robot::RobotModel;
 
@@ -21,15 +22,7 @@ pub trait DistanceField {
     /// places a cell apart, both ends among them.
     fn least_above(&self, foot: [f64; 3], rise: f64) -> (f64, [f64; 3]) {
         let steps = if self.cell() > 0.0 { (rise / self.cell()).ceil().max(1.0) } else { 16.0 };
-        let mut least = (f64::INFINITY, [0.0; 3]);
-        for k in 0..=steps as usize {
-            let z = foot[2] + rise * k as f64 / steps;
-            let (distance, [x, y, _]) = self.distance_gradient([foot[0], foot[1], z]);
-            if distance < least.0 {
-                least = (distance, [x, y, 0.0]);
-            }
-        }
-        least
+        least_of_points(foot, rise, steps as usize, |p| self.distance_gradient(p))
     }
 }
 
