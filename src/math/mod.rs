@@ -5,6 +5,7 @@ pub mod block_tridiagonal;
 #[cfg(test)]
 pub(crate) mod fd;
 pub mod gjk;
+pub mod halton;
 pub mod lbfgs;
 pub mod pentadiagonal;
 pub mod poly;

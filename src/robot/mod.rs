@@ -176,6 +176,17 @@ pub struct Shape {
 }
 
 impl RobotModel {
+    /// Whether any joint moves a body.
+    pub fn is_moved(&self, mut body: usize) -> bool {
+        while self.bodies[body].motion.is_none() {
+            if body == 0 {
+                return false;
+            }
+            body = self.bodies[body].parent;
+        }
+        true
+    }
+
     /// Poses of all bodies in the base frame at joint values `q` (one per moving joint); `out` is cleared first.
     pub fn body_poses(&self, q: &[f64], out: &mut Vec<Isometry3<f64>>) {
         out.clear();

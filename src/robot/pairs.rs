@@ -16,7 +16,7 @@ use super::spec::RobotSpec;
 use super::tree::Tree;
 use super::urdf::Urdf;
 use super::{RobotModel, Shape};
-use crate::math::gjk;
+use crate::math::{gjk, halton};
 
 /// Shapes nearer than this touch, m.
 const TOUCH: f64 = 1e-6;
@@ -242,20 +242,13 @@ pub(super) fn meetings(robot: &RobotModel) -> Vec<Meeting> {
 
 /// Posture `index` of a Halton sequence over the joints' ranges; endless joints turn once.
 fn spread(robot: &RobotModel, index: usize) -> Vec<f64> {
-    let primes = (2usize..).filter(|n| (2..*n).all(|d| n % d != 0));
-    let value = |(joint, base): (&super::MovingJoint, usize)| {
-        let (mut share, mut digit, mut rest) = (0.0, 1.0 / base as f64, index);
-        while rest > 0 {
-            share += digit * (rest % base) as f64;
-            digit /= base as f64;
-            rest /= base;
-        }
+    let value = |(axis, joint): (usize, &super::MovingJoint)| {
         let turn = std::f64::consts::PI;
         let low = if joint.lower.is_finite() { joint.lower } else { -turn };
         let high = if joint.upper.is_finite() { joint.upper } else { turn };
-        low + share * (high - low)
+        low + halton::value(axis, index) * (high - low)
     };
-    robot.joints.iter().zip(primes).map(value).collect()
+    robot.joints.iter().enumerate().map(value).collect()
 }
 
 /// Whether two shapes overlap or are nearer than [`TOUCH`].

@@ -7,10 +7,10 @@ use std::cmp::Ordering;
 use std::collections::{BinaryHeap, HashMap};
 use std::hash::{BuildHasherDefault, Hasher};
 
+use super::bits::Bits;
 use super::collide::{BaseMotion, Collider};
 use super::heuristic::CostToGo;
 use super::lattice::{HEADINGS, Lattice, LatticeState, heading_angle, nearest_heading};
-use super::posture::Bits;
 use super::route::{Grain, Route};
 use super::{Query, SearchOptions};
 use crate::geom::{Pose2, wrap_angle};

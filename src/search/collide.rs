@@ -6,9 +6,10 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
+use super::bits::Bits;
 use super::obstacles;
 use super::placed::{Base, Placed, Posed};
-use super::posture::{Bits, Neighbours, PostureGrid};
+use super::posture::{Neighbours, Postures};
 use crate::esdf::Esdf;
 use crate::geom::{Aabb, Pose2};
 use crate::map::VoxelMap;
@@ -114,7 +115,7 @@ pub(super) struct Collider<'a, const W: usize> {
     esdf: &'a Esdf,
     map: &'a VoxelMap,
     clearance: f64,
-    pub grid: PostureGrid,
+    pub postures: Postures,
     pub neighbours: Neighbours<W>,
     rigid: Vec<Placed>,
     moving: Vec<Placed>,
@@ -134,18 +135,18 @@ pub(super) struct Collider<'a, const W: usize> {
 }
 
 impl<'a, const W: usize> Collider<'a, W> {
-    pub fn new(robot: &'a RobotModel, esdf: &'a Esdf, map: &'a VoxelMap, clearance: f64, grid: PostureGrid) -> Self {
+    pub fn new(robot: &'a RobotModel, esdf: &'a Esdf, map: &'a VoxelMap, clearance: f64, postures: Postures) -> Self {
         let mut rigid = Vec::new();
         let mut moving = Vec::new();
-        let postures: Vec<_> = (0..grid.count()).map(|p| robot.shape_poses(&grid.joints(p))).collect();
-        let neighbours = Neighbours::new(&grid);
+        let places: Vec<_> = (0..postures.count()).map(|p| robot.shape_poses(postures.joints(p))).collect();
+        let neighbours = Neighbours::new(&postures);
         for (s, shape) in robot.shapes.iter().enumerate() {
             let place = |p: &Vec<nalgebra::Isometry3<f64>>| Posed::new(&p[s]);
-            if is_moved(robot, shape.body) {
-                let poses: Vec<Posed> = postures.iter().map(place).collect();
-                moving.push(Placed::new(&shape.convex, poses, &grid));
+            if robot.is_moved(shape.body) {
+                let poses: Vec<Posed> = places.iter().map(place).collect();
+                moving.push(Placed::new(&shape.convex, poses, &postures));
             } else {
-                rigid.push(Placed::new(&shape.convex, vec![place(&postures[0])], &grid));
+                rigid.push(Placed::new(&shape.convex, vec![place(&places[0])], &postures));
             }
         }
         let mut heights = [f64::INFINITY, f64::NEG_INFINITY];
@@ -163,16 +164,16 @@ impl<'a, const W: usize> Collider<'a, W> {
         heights = [heights[0] - slack, heights[1] + slack];
         let reach = rigid.iter().chain(&moving).map(|p| p.reach).fold(0.0, f64::max);
         let ball = (0.5 * (heights[0] + heights[1]), reach.hypot(0.5 * (heights[1] - heights[0])));
-        let mut order = Vec::with_capacity(grid.count());
-        let mut seen = vec![false; grid.count()];
+        let mut order = Vec::with_capacity(postures.count());
+        let mut seen = vec![false; postures.count()];
         for step in (0..=10).rev().map(|k| 1usize << k) {
-            for p in (0..grid.count()).step_by(step) {
+            for p in (0..postures.count()).step_by(step) {
                 if !std::mem::replace(&mut seen[p], true) {
                     order.push(p);
                 }
             }
         }
-        let all = Bits::all(grid.count());
+        let all = Bits::all(postures.count());
         let balls = rigid.iter().flat_map(|placed| &placed.balls);
         let deepest = balls.filter_map(|ball| Some((ball.centres[0], ball.inner?))).max_by(|a, b| a.1.total_cmp(&b.1));
         let tiles = RefCell::default();
@@ -181,7 +182,7 @@ impl<'a, const W: usize> Collider<'a, W> {
             esdf,
             map,
             clearance,
-            grid,
+            postures,
             neighbours,
             rigid,
             moving,
@@ -209,8 +210,8 @@ impl<'a, const W: usize> Collider<'a, W> {
     pub fn touching(&self) -> Bits<W> {
         let pairs = self.robot.self_pairs();
         let mut out = Bits::EMPTY;
-        let touch = |p: &usize| self.robot.touching(&pairs, &self.grid.joints(*p)).is_some();
-        (0..self.grid.count()).filter(|_| !pairs.is_empty()).filter(touch).for_each(|p| out.insert(p));
+        let touch = |p: &usize| self.robot.touching(&pairs, self.postures.joints(*p)).is_some();
+        (0..self.postures.count()).filter(|_| !pairs.is_empty()).filter(touch).for_each(|p| out.insert(p));
         out
     }
 
@@ -285,7 +286,7 @@ impl<'a, const W: usize> Collider<'a, W> {
                 }
             };
             mark(posture);
-            for (joint, (count, stride)) in self.grid.axes().enumerate() {
+            for (joint, &(count, stride)) in self.postures.axes().iter().enumerate() {
                 let steps =
                     if placed.step_moves[joint] > 0.0 { (margin / placed.step_moves[joint]) as usize } else { count };
                 let at = posture / stride % count;
@@ -505,19 +506,6 @@ fn overlap(apart: impl Fn(&Vector3<f64>) -> Vector3<f64>, rotation: &Matrix3<f64
         [own, -own, world, -world]
     });
     spread.chain(axes).map(|d| apart(&d).dot(&d)).fold(f64::INFINITY, f64::min)
-}
-
-/// Whether any joint moves a body.
-fn is_moved(robot: &RobotModel, mut body: usize) -> bool {
-    loop {
-        if robot.bodies[body].motion.is_some() {
-            return true;
-        }
-        if body == 0 {
-            return false;
-        }
-        body = robot.bodies[body].parent;
-    }
 }
 
 fn sweep_bounds(placed: &Placed, sweep: &Sweep) -> Aabb {

@@ -1,10 +1,11 @@
 //! What a person needs to know of a search that failed: what is in the way, where, in which posture, and how much is missing.
 
+use super::bits::Bits;
 use super::collide::{BaseMotion, Collider};
 use super::error::{Absence, Blocked, SearchError, Tightest};
 use super::heuristic::{self, NEIGHBOURS};
 use super::lattice::Lattice;
-use super::posture::{Bits, PostureGrid};
+use super::posture::Postures;
 use super::solve::{self, End, Problem, Solver};
 use super::{Contact, SearchPath, SearchState};
 use crate::geom::Pose2;
@@ -26,20 +27,20 @@ const STEP: f64 = 0.05;
 const SMALL: f64 = 0.25;
 
 /// What blocks an end, in the heading and posture that are blocked least among those that would do.
-pub(super) fn blocked<const W: usize>(problem: &Problem<'_>, grid: PostureGrid, end: End) -> SearchError {
+pub(super) fn blocked<const W: usize>(problem: &Problem<'_>, postures: Postures, end: End) -> SearchError {
     let Problem { map, esdf, robot, query, options } = *problem;
-    let collider = Collider::<W>::new(robot, esdf, map, options.clearance, grid);
+    let collider = Collider::<W>::new(robot, esdf, map, options.clearance, postures);
     let (pose, joints, headings) = match end {
         End::Start => (query.start, &query.start_joints, vec![query.start.yaw]),
         End::Goal => (query.goal, &query.goal_joints, solve::goal_headings(query)),
     };
     let postures: Vec<usize> =
-        (0..collider.grid.count()).filter(|p| solve::agrees(&collider.grid, *p, joints)).collect();
+        (0..collider.postures.count()).filter(|p| collider.postures.agrees(*p, end, joints)).collect();
     let stride = (headings.len() * postures.len()).div_ceil(MOST_LOOKS).max(1);
     let looks = headings.iter().flat_map(|yaw| postures.iter().map(|p| (*yaw, *p))).step_by(stride);
     let seen = looks.map(|(yaw, posture)| {
         let exact: Vec<f64> =
-            joints.iter().zip(collider.grid.joints(posture)).map(|(asked, own)| asked.unwrap_or(own)).collect();
+            joints.iter().zip(collider.postures.joints(posture)).map(|(asked, own)| asked.unwrap_or(*own)).collect();
         (collider.contact(Pose2 { yaw, ..pose }, &exact), exact)
     });
     let best = seen.max_by(|a, b| a.0.clearance.total_cmp(&b.0.clearance));
@@ -185,7 +186,7 @@ fn way_with_less<const W: usize>(solver: &Solver<'_, W>, less: f64) -> Option<Se
     options.clearance = (options.clearance - less).max(0.0);
     let robot = thinner(problem.robot, less - problem.options.clearance);
     let problem = Problem { robot: &robot, options: &options, ..problem };
-    let solver = Solver::<W>::new(problem, solver.collider.grid.clone()).ok()?;
+    let solver = Solver::<W>::new(problem, solver.collider.postures.clone()).ok()?;
     solver.guided().or_else(|| solver.on_the_lattice(QUICK).ok())
 }
 

@@ -1,7 +1,8 @@
 //! The joint path along a route, by dynamic programming over its pieces: least change, changes where there is time for
 //! them, and away from postures that are not free.
 
-use super::posture::{Bits, Neighbours};
+use super::bits::Bits;
+use super::posture::Neighbours;
 
 /// A posture change within the time that the base's piece takes anyway costs this per step ...
 const STEP: u32 = 2;
@@ -73,13 +74,13 @@ fn relax<const W: usize>(
     let origin = from.to_vec();
     let mut changed = false;
     for p in mask.iter() {
-        for q in neighbours.of(p) {
+        neighbours.each(p, |q| {
             if before[q] < UNREACHED && before[q] + step < cost[p] {
                 cost[p] = before[q] + step;
                 from[p] = origin[q];
                 changed = true;
             }
-        }
+        });
     }
     changed
 }
@@ -124,7 +125,10 @@ mod tests {
             base,
             ignore_pairs: vec![],
         };
-        Neighbours::new(&super::super::posture::PostureGrid::new(&robot, &[0.0]))
+        let pose = crate::geom::Pose2::default();
+        let [start_joints, goal_joints] = [vec![None], vec![None]];
+        let query = super::super::Query { start: pose, start_joints, goal: pose, goal_yaw: None, goal_joints };
+        Neighbours::new(&super::super::posture::Postures::new(&robot, &query, 0))
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! sweep. (\[SCR\] takes a hybrid A* for its initial path; see `astar` for what replaces its fourth dimension.)
 
 mod astar;
+mod bits;
 mod collide;
 mod drive;
 mod error;
@@ -18,6 +19,7 @@ mod obstacles;
 mod placed;
 mod posture;
 mod queue;
+mod roadmap;
 mod route;
 mod shortcut;
 mod solve;
@@ -29,7 +31,7 @@ use crate::robot::RobotModel;
 
 pub use collide::Contact;
 pub use error::{Absence, Blocked, SearchError, Tightest};
-use posture::PostureGrid;
+use posture::Postures;
 use solve::{NoPath, Problem, Solver};
 
 /// A path on the lattice, joined to the exact start and goal. Between consecutive states the motion is linear in joint
@@ -106,9 +108,6 @@ pub fn search(
     query: &Query,
     options: &SearchOptions,
 ) -> Result<SearchPath, SearchError> {
-    let near: Vec<f64> =
-        query.start_joints.iter().zip(&robot.joints).map(|(q, j)| q.unwrap_or(0f64.clamp(j.lower, j.upper))).collect();
-    let grid = PostureGrid::new(robot, &near);
     let bounds = map.bounds();
     for (which, pose) in [("start", query.start), ("goal", query.goal)] {
         let inside =
@@ -119,13 +118,18 @@ pub fn search(
         }
     }
     let problem = Problem { map, esdf, robot, query, options };
-    if grid.count() <= 64 { solve::<1>(problem, grid) } else { solve::<{ posture::MOST_POSTURES / 64 }>(problem, grid) }
+    let postures = Postures::new(robot, query, 0);
+    if postures.count() <= 64 {
+        solve::<1>(problem, postures)
+    } else {
+        solve::<{ posture::MOST_POSTURES / 64 }>(problem, postures)
+    }
 }
 
-fn solve<const W: usize>(problem: Problem<'_>, grid: PostureGrid) -> Result<SearchPath, SearchError> {
-    let mut solver = match Solver::<W>::new(problem, grid.clone()) {
+fn solve<const W: usize>(problem: Problem<'_>, postures: Postures) -> Result<SearchPath, SearchError> {
+    let mut solver = match Solver::<W>::new(problem, postures.clone()) {
         Ok(solver) => solver,
-        Err(end) => return Err(explain::blocked::<W>(&problem, grid, end)),
+        Err(end) => return Err(explain::blocked::<W>(&problem, postures, end)),
     };
     loop {
         if let Some(path) = solver.guided() {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::posture::PostureGrid;
+use super::posture::Postures;
 use crate::geom::{Aabb, Pose2};
 use crate::robot::Convex;
 
@@ -121,12 +121,13 @@ pub(super) struct Placed {
 }
 
 impl Placed {
-    pub fn new(convex: &Convex, poses: Vec<Posed>, grid: &PostureGrid) -> Self {
+    pub fn new(convex: &Convex, poses: Vec<Posed>, postures: &Postures) -> Self {
         let half = convex.half_extents();
         let radius = convex.bounding_radius();
-        let step_moves: Vec<f64> = grid
+        let step_moves: Vec<f64> = postures
             .axes()
-            .map(|(count, stride)| {
+            .iter()
+            .map(|&(count, stride)| {
                 let pairs = (0..poses.len()).filter(|p| poses.len() > 1 && p / stride % count + 1 < count);
                 pairs.map(|p| farthest_move(&poses[p], &poses[p + stride], half)).fold(0.0, f64::max)
             })

@@ -1,196 +1,210 @@
-//! The postures that are searched: a grid over the moving joints, and sets of postures as bit masks.
+//! The postures that are searched, and which of them are neighbours.
 //!
-//! One joint has 64 values, so a set is one word; no joint is one posture; more joints share at most 1024 postures. All
-//! code runs on `Bits<W>` and the grid's strides and knows no number of joints.
+//! One or two joints are sampled as a grid over their ranges: 64 values of one joint, 32 of each of two. Of more joints no grid is
+//! fine enough: theirs is a roadmap (`roadmap`), some postures and the straight ways between them, sampled as finely. No joint is one
+//! posture. All other code asks for neighbours and sets of postures (`Bits<W>`) and knows no number of joints.
 
+use super::Query;
+use super::bits::Bits;
+use super::roadmap;
+use super::solve::End;
 use crate::robot::RobotModel;
 
-/// Postures are a grid over the joints' ranges.
+/// Postures with the steps between them.
 #[derive(Debug, Clone)]
-pub(super) struct PostureGrid {
-    /// Sampled values of each joint, ascending.
+pub(super) struct Postures {
+    /// Joint values, one a posture.
     values: Vec<Vec<f64>>,
-    /// Index distance of neighbours along each joint.
-    strides: Vec<usize>,
-    count: usize,
+    steps: Steps,
+}
+
+#[derive(Debug, Clone)]
+enum Steps {
+    Grid {
+        /// Number of sampled values of each joint, and index distance of neighbours along it.
+        axes: Vec<(usize, usize)>,
+        /// Distance between neighbouring values of each joint.
+        spacing: Vec<f64>,
+    },
+    Roadmap(Roadmap),
+}
+
+/// Neighbours one by one.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Roadmap {
+    /// Of each posture, ascending.
+    pub neighbours: Vec<Vec<u32>>,
+    /// Longest time that a step takes at the joints' planning speeds, s.
+    pub step_time: f64,
+    /// Postures that are meant for the start and for the goal.
+    pub ends: [Vec<u32>; 2],
 }
 
 /// Most postures there can be: bits of the widest mask.
 pub(super) const MOST_POSTURES: usize = 1024;
+/// Most joints that are sampled as a grid.
+const GRID_JOINTS: usize = 2;
 
-impl PostureGrid {
-    /// The grid for a robot. A joint without limits is sampled one turn about `near`.
-    pub fn new(robot: &RobotModel, near: &[f64]) -> Self {
+impl Postures {
+    /// Those for a robot and a question. A joint without limits is sampled one turn about its value at the start.
+    pub fn new(robot: &RobotModel, query: &Query, variant: usize) -> Self {
+        let near = |(asked, joint): (&Option<f64>, &crate::robot::MovingJoint)| {
+            asked.unwrap_or(0f64.clamp(joint.lower, joint.upper))
+        };
+        let near: Vec<f64> = query.start_joints.iter().zip(&robot.joints).map(near).collect();
+        if robot.joints.len() <= GRID_JOINTS {
+            return Self::grid(robot, &near);
+        }
+        let (values, roadmap) = roadmap::build(robot, &near, [&query.start_joints, &query.goal_joints], variant);
+        Self { values, steps: Steps::Roadmap(roadmap) }
+    }
+
+    fn grid(robot: &RobotModel, near: &[f64]) -> Self {
         let per_joint = match robot.joints.len() {
             0 | 1 => 64,
             n => (2..=64usize).rev().find(|k| k.pow(n as u32) <= MOST_POSTURES).unwrap_or(1),
         };
-        let mut strides = Vec::new();
-        let mut count = 1;
-        let mut values = Vec::new();
-        for (joint, near) in robot.joints.iter().zip(near) {
+        let samples = robot.joints.iter().zip(near).map(|(joint, near)| {
             let lower = if joint.lower.is_finite() { joint.lower } else { near - std::f64::consts::PI };
             let upper = if joint.upper.is_finite() { joint.upper } else { near + std::f64::consts::PI };
             let samples = if upper > lower { per_joint } else { 1 };
             let step = (upper - lower) / (samples.max(2) - 1) as f64;
-            values.push((0..samples).map(|k| if k + 1 == samples { upper } else { lower + step * k as f64 }).collect());
-            strides.push(count);
-            count *= samples;
+            (0..samples).map(|k| if k + 1 == samples { upper } else { lower + step * k as f64 }).collect()
+        });
+        Self::over(samples.collect())
+    }
+
+    /// All combinations of the joints' values.
+    fn over(samples: Vec<Vec<f64>>) -> Self {
+        let mut count = 1;
+        let mut axes = Vec::new();
+        for own in &samples {
+            axes.push((own.len(), count));
+            count *= own.len();
         }
-        Self { values, strides, count }
+        let of = |p: usize| samples.iter().zip(&axes).map(|(v, (len, stride))| v[p / stride % len]).collect();
+        let values = (0..count).map(of).collect();
+        let spacing = samples.iter().map(|v| if v.len() > 1 { v[1] - v[0] } else { 0.0 }).collect();
+        Self { values, steps: Steps::Grid { axes, spacing } }
     }
 
     pub fn count(&self) -> usize {
-        self.count
+        self.values.len()
     }
 
     /// Joint values of a posture.
-    pub fn joints(&self, posture: usize) -> Vec<f64> {
-        self.values.iter().zip(&self.strides).map(|(v, stride)| v[posture / stride % v.len()]).collect()
+    pub fn joints(&self, posture: usize) -> &[f64] {
+        &self.values[posture]
     }
 
-    /// The posture nearest to given joint values.
-    pub fn nearest(&self, joints: &[f64]) -> usize {
-        let mut posture = 0;
-        for ((values, stride), wanted) in self.values.iter().zip(&self.strides).zip(joints) {
-            let distance = |k: &usize| (values[*k] - wanted).abs();
-            let best = (0..values.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0);
-            posture += best * stride;
+    /// Whether every posture there is has one of these near it: then what is not found does not exist.
+    pub fn is_exhaustive(&self) -> bool {
+        matches!(self.steps, Steps::Grid { .. })
+    }
+
+    /// Whether a posture will do at an end where these joint values are asked for: it is the nearest one.
+    pub fn agrees(&self, posture: usize, end: End, asked: &[Option<f64>]) -> bool {
+        match &self.steps {
+            Steps::Grid { axes, .. } => asked.iter().enumerate().all(|(joint, asked)| {
+                let Some(wanted) = asked else { return true };
+                let (count, stride) = axes[joint];
+                let at = posture / stride % count;
+                let first = posture - at * stride;
+                let distance = |k: &usize| (self.values[first + k * stride][joint] - wanted).abs();
+                (0..count).min_by(|a, b| distance(a).total_cmp(&distance(b))) == Some(at)
+            }),
+            Steps::Roadmap(roadmap) => {
+                asked.iter().all(Option::is_none) || roadmap.ends[end as usize].contains(&(posture as u32))
+            }
         }
-        posture
-    }
-
-    /// Number of sampled values and index distance of neighbours, per joint.
-    pub fn axes(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        self.values.iter().zip(&self.strides).map(|(v, s)| (v.len(), *s))
     }
 
     /// Postures with one of these joints at an end of its range.
     pub fn brinks<const W: usize>(&self, joints: impl Iterator<Item = usize>) -> Bits<W> {
         let mut out = Bits::EMPTY;
+        let Steps::Grid { axes, .. } = &self.steps else { return out };
         for joint in joints {
-            let (count, stride) = (self.values[joint].len(), self.strides[joint]);
+            let (count, stride) = axes[joint];
             let at_end = |p: &usize| [0, count - 1].contains(&(p / stride % count));
             // A joint with one value has nowhere to go.
-            (0..self.count).filter(|p| count > 1 && at_end(p)).for_each(|p| out.insert(p));
+            (0..self.count()).filter(|p| count > 1 && at_end(p)).for_each(|p| out.insert(p));
         }
         out
     }
 
-    /// Distance between neighbouring values of a joint.
-    pub fn step(&self, joint: usize) -> f64 {
-        let v = &self.values[joint];
-        if v.len() > 1 { v[1] - v[0] } else { 0.0 }
-    }
-}
-
-/// A set of postures: bit p is posture p.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Bits<const W: usize>([u64; W]);
-
-impl<const W: usize> Bits<W> {
-    pub const EMPTY: Self = Self([0; W]);
-
-    /// The first `count` postures.
-    pub fn all(count: usize) -> Self {
-        Self(std::array::from_fn(|w| match count.saturating_sub(64 * w) {
-            0 => 0,
-            rest @ 1..64 => (1 << rest) - 1,
-            _ => u64::MAX,
-        }))
-    }
-
-    pub fn insert(&mut self, posture: usize) {
-        self.0[posture / 64] |= 1 << (posture % 64);
-    }
-
-    pub fn remove(&mut self, posture: usize) {
-        self.0[posture / 64] &= !(1 << (posture % 64));
-    }
-
-    pub fn contains(&self, posture: usize) -> bool {
-        self.0[posture / 64] >> (posture % 64) & 1 == 1
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.0.iter().all(|w| *w == 0)
-    }
-
-    pub fn and(self, other: Self) -> Self {
-        Self(std::array::from_fn(|w| self.0[w] & other.0[w]))
-    }
-
-    pub fn or(self, other: Self) -> Self {
-        Self(std::array::from_fn(|w| self.0[w] | other.0[w]))
-    }
-
-    pub fn minus(self, other: Self) -> Self {
-        Self(std::array::from_fn(|w| self.0[w] & !other.0[w]))
-    }
-
-    /// Members in ascending order.
-    pub fn iter(self) -> impl Iterator<Item = usize> {
-        (0..W).flat_map(move |w| {
-            let mut word = self.0[w];
-            std::iter::from_fn(move || {
-                (word != 0).then(|| {
-                    let bit = word.trailing_zeros() as usize;
-                    word &= word - 1;
-                    w * 64 + bit
+    /// Steps of every joint that there is time for, at 70 % of the planning speeds.
+    pub fn steps_within(&self, robot: &RobotModel, time: f64) -> usize {
+        const SHARE: f64 = 0.7;
+        let steps = match &self.steps {
+            Steps::Grid { spacing, .. } => {
+                robot.joints.iter().zip(spacing).fold(f64::INFINITY, |least, (joint, step)| {
+                    let own = SHARE * joint.limits.planning()[0] * time / step;
+                    if *step > 0.0 { least.min(own) } else { least }
                 })
-            })
-        })
+            }
+            Steps::Roadmap(roadmap) => SHARE * time / roadmap.step_time,
+        };
+        steps.min(1024.0) as usize
     }
 
-    /// Every member moved `by` places up.
-    fn up(self, by: usize) -> Self {
-        let (words, bits) = (by / 64, by % 64);
-        Self(std::array::from_fn(|w| {
-            let low = |k: usize| if w >= k { self.0[w - k] } else { 0 };
-            if bits == 0 { low(words) } else { low(words) << bits | low(words + 1) >> (64 - bits) }
-        }))
-    }
-
-    /// Every member moved `by` places down.
-    fn down(self, by: usize) -> Self {
-        let (words, bits) = (by / 64, by % 64);
-        Self(std::array::from_fn(|w| {
-            let high = |k: usize| self.0.get(w + k).copied().unwrap_or(0);
-            if bits == 0 { high(words) } else { high(words) >> bits | high(words + 1) << (64 - bits) }
-        }))
+    /// Number of sampled values of each joint, and index distance of neighbours along it; none where postures are not a grid.
+    pub fn axes(&self) -> &[(usize, usize)] {
+        match &self.steps {
+            Steps::Grid { axes, .. } => axes,
+            Steps::Roadmap(_) => &[],
+        }
     }
 }
 
 /// Neighbourhoods of sets of postures.
 #[derive(Debug, Clone)]
-pub(super) struct Neighbours<const W: usize> {
+pub(super) enum Neighbours<const W: usize> {
     /// Per joint: index distance, postures with a lower neighbour, postures with an upper one.
-    axes: Vec<(usize, Bits<W>, Bits<W>)>,
+    Grid(Vec<(usize, Bits<W>, Bits<W>)>),
+    /// Of each posture, one by one and as a set.
+    Roadmap(Vec<(Vec<u32>, Bits<W>)>),
 }
 
 impl<const W: usize> Neighbours<W> {
-    pub fn new(grid: &PostureGrid) -> Self {
-        let axes = grid.axes().map(|(count, stride)| {
-            let mut ends = (Bits::EMPTY, Bits::EMPTY);
-            for p in 0..grid.count() {
-                let at = p / stride % count;
-                if at > 0 {
-                    ends.0.insert(p);
-                }
-                if at + 1 < count {
-                    ends.1.insert(p);
-                }
+    pub fn new(postures: &Postures) -> Self {
+        match &postures.steps {
+            Steps::Grid { axes, .. } => {
+                let axis = |(count, stride): &(usize, usize)| {
+                    let mut ends = (Bits::EMPTY, Bits::EMPTY);
+                    for p in 0..postures.count() {
+                        let at = p / stride % count;
+                        if at > 0 {
+                            ends.0.insert(p);
+                        }
+                        if at + 1 < *count {
+                            ends.1.insert(p);
+                        }
+                    }
+                    (*stride, ends.0, ends.1)
+                };
+                Self::Grid(axes.iter().map(axis).collect())
             }
-            (stride, ends.0, ends.1)
-        });
-        Self { axes: axes.collect() }
+            Steps::Roadmap(roadmap) => {
+                let of = |own: &Vec<u32>| {
+                    let mut set = Bits::EMPTY;
+                    own.iter().for_each(|p| set.insert(*p as usize));
+                    (own.clone(), set)
+                };
+                Self::Roadmap(roadmap.neighbours.iter().map(of).collect())
+            }
+        }
     }
 
     /// The set and all postures one step away, within `free`.
     pub fn dilate(&self, set: Bits<W>, free: Bits<W>) -> Bits<W> {
         let mut out = set;
-        for (stride, has_lower, has_upper) in &self.axes {
-            out = out.or(set.and(*has_upper).up(*stride)).or(set.and(*has_lower).down(*stride));
+        match self {
+            Self::Grid(axes) => {
+                for (stride, has_lower, has_upper) in axes {
+                    out = out.or(set.and(*has_upper).up(*stride)).or(set.and(*has_lower).down(*stride));
+                }
+            }
+            Self::Roadmap(neighbours) => set.iter().for_each(|p| out = out.or(neighbours[p].1)),
         }
         out.and(free)
     }
@@ -198,25 +212,29 @@ impl<const W: usize> Neighbours<W> {
     /// All postures that can be reached from the set by steps within `free`.
     pub fn flood(&self, set: Bits<W>, free: Bits<W>) -> Bits<W> {
         let mut reached = set.and(free);
-        if reached == free {
-            return reached;
+        let mut front = reached;
+        while reached != free && !front.is_empty() {
+            front = self.dilate(front, free).minus(reached);
+            reached = reached.or(front);
         }
-        loop {
-            let next = self.dilate(reached, free);
-            if next == reached {
-                return reached;
-            }
-            reached = next;
-        }
+        reached
     }
 
-    /// The neighbours of one posture.
-    pub fn of(&self, posture: usize) -> impl Iterator<Item = usize> + '_ {
-        self.axes.iter().flat_map(move |(stride, has_lower, has_upper)| {
-            let lower = has_lower.contains(posture).then(|| posture - stride);
-            let upper = has_upper.contains(posture).then(|| posture + stride);
-            lower.into_iter().chain(upper)
-        })
+    /// Tells the neighbours of one posture.
+    pub fn each(&self, posture: usize, mut tell: impl FnMut(usize)) {
+        match self {
+            Self::Grid(axes) => {
+                for (stride, has_lower, has_upper) in axes {
+                    if has_lower.contains(posture) {
+                        tell(posture - stride);
+                    }
+                    if has_upper.contains(posture) {
+                        tell(posture + stride);
+                    }
+                }
+            }
+            Self::Roadmap(neighbours) => neighbours[posture].0.iter().for_each(|q| tell(*q as usize)),
+        }
     }
 }
 
@@ -225,14 +243,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn grid(counts: &[usize]) -> PostureGrid {
-        let mut strides = Vec::new();
-        let mut count = 1;
-        for c in counts {
-            strides.push(count);
-            count *= c;
-        }
-        PostureGrid { values: counts.iter().map(|c| (0..*c).map(|k| k as f64).collect()).collect(), strides, count }
+    fn grid(counts: &[usize]) -> Postures {
+        Postures::over(counts.iter().map(|c| (0..*c).map(|k| k as f64).collect()).collect())
     }
 
     proptest! {
@@ -272,10 +284,14 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_posture_of_a_posture_is_itself() {
+    fn of_a_grid_the_nearest_posture_alone_agrees_with_what_is_asked_for() {
         let grid = grid(&[9, 5, 4]);
         for p in 0..180 {
-            assert_eq!(grid.nearest(&grid.joints(p)), p);
+            let asked: Vec<Option<f64>> = grid.joints(p).iter().map(|v| Some(v + 0.3)).collect();
+            for q in 0..180 {
+                assert_eq!(grid.agrees(q, End::Goal, &asked), p == q);
+            }
+            assert!(grid.agrees(p, End::Start, &[None; 3]));
         }
     }
 }

@@ -3,8 +3,8 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
+use super::bits::Bits;
 use super::collide::{BaseMotion, Collider};
-use super::posture::Bits;
 use super::route::{Grain, Route, drive_pieces, spin_pieces};
 use crate::geom::{Pose2, wrap_angle};
 

@@ -1,13 +1,14 @@
 //! The tries, one after the other: straight, along the ways that count turns, along the guide's, and over the whole lattice.
 
 use super::astar::{self, AStar, Outcome};
+use super::bits::Bits;
 use super::collide::{BaseMotion, Collider};
 use super::guide::{self, Guide};
 use super::headed::{self, Headed};
 use super::heuristic::{self, Core, CostToGo};
 use super::joints;
 use super::lattice::{self, Lattice};
-use super::posture::{Bits, PostureGrid};
+use super::posture::Postures;
 use super::route::{Grain, Route};
 use super::shortcut::{CheckedRoute, Shortcutter};
 use super::{Query, SearchMove, SearchOptions, SearchPath, SearchState};
@@ -73,10 +74,11 @@ pub(super) struct Solver<'a, const W: usize> {
 impl<'a, const W: usize> Solver<'a, W> {
     /// # Errors
     /// The end that is blocked.
-    pub fn new(problem: Problem<'a>, grid: PostureGrid) -> Result<Self, End> {
+    pub fn new(problem: Problem<'a>, postures: Postures) -> Result<Self, End> {
         let Problem { map, esdf, robot, query, options } = problem;
-        let mut collider = Collider::<W>::new(robot, esdf, map, options.clearance, grid);
-        let mut start_postures = free_postures(&collider, query.start, &query.start_joints).ok_or(End::Start)?;
+        let mut collider = Collider::<W>::new(robot, esdf, map, options.clearance, postures);
+        let mut start_postures =
+            free_postures(&collider, query.start, End::Start, &query.start_joints).ok_or(End::Start)?;
         let mut goal_postures = goal_postures(&collider, query).ok_or(End::Goal)?;
         // Where an end leaves no other choice, samples in which links touch stay: the exact joint values may be apart.
         let mut touching = collider.touching();
@@ -206,7 +208,7 @@ impl<'a, const W: usize> Solver<'a, W> {
             }
             // At the lattice's own grain whatever the search got through passes, but for the tolerance of the checks.
             let lenient = (clearance - CHECK_TOLERANCE).max(0.0);
-            let mut lenient = Collider::<W>::new(robot, esdf, map, lenient, self.collider.grid.clone());
+            let mut lenient = Collider::<W>::new(robot, esdf, map, lenient, self.collider.postures.clone());
             lenient.only(self.collider.all());
             if let Ok(path) = self.finish(&route, Grain::FINE, &lenient, expanded) {
                 return Ok(path);
@@ -248,27 +250,25 @@ fn turn_cost(robot: &RobotModel) -> f64 {
 }
 
 /// Postures that are free in a pose and agree with what is asked for.
-fn free_postures<const W: usize>(collider: &Collider<'_, W>, pose: Pose2, joints: &[Option<f64>]) -> Option<Bits<W>> {
+fn free_postures<const W: usize>(
+    collider: &Collider<'_, W>,
+    pose: Pose2,
+    end: End,
+    joints: &[Option<f64>],
+) -> Option<Bits<W>> {
     let mut wanted = collider.free(&BaseMotion { from: pose, to: pose });
     for p in wanted.iter() {
-        if !agrees(&collider.grid, p, joints) {
+        if !collider.postures.agrees(p, end, joints) {
             wanted.remove(p);
         }
     }
     (!wanted.is_empty()).then_some(wanted)
 }
 
-/// Whether a sampled posture is the nearest one to what is asked for.
-pub(super) fn agrees(grid: &PostureGrid, posture: usize, joints: &[Option<f64>]) -> bool {
-    let own = grid.joints(posture);
-    let wanted: Vec<f64> = joints.iter().zip(&own).map(|(asked, own)| asked.unwrap_or(*own)).collect();
-    grid.nearest(&wanted) == posture
-}
-
 /// Postures free at the goal, in any heading that will do.
 fn goal_postures<const W: usize>(collider: &Collider<'_, W>, query: &Query) -> Option<Bits<W>> {
     let headings = goal_headings(query).into_iter();
-    let free = |yaw| free_postures(collider, Pose2 { yaw, ..query.goal }, &query.goal_joints);
+    let free = |yaw| free_postures(collider, Pose2 { yaw, ..query.goal }, End::Goal, &query.goal_joints);
     headings.filter_map(free).reduce(Bits::or)
 }
 
@@ -289,15 +289,16 @@ fn with_joints<const W: usize>(
     expanded: usize,
 ) -> SearchPath {
     let masks = checked.masks();
-    let rates: Vec<usize> = pieces.iter().map(|piece| steps_in_time(robot, &collider.grid, piece)).collect();
+    let rates: Vec<usize> =
+        pieces.iter().map(|piece| collider.postures.steps_within(robot, time_of(robot, piece))).collect();
     // The optimiser's curves need some room to swing within the ranges, too.
     let open = (0..robot.joints.len()).filter(|m| query.start_joints[*m].or(query.goal_joints[*m]).is_none());
-    let brinks = collider.grid.brinks(open);
+    let brinks = collider.postures.brinks(open);
     let ends = [start_postures, goal_postures];
-    let postures = joints::choose(&collider.neighbours, collider.grid.count(), &masks, &rates, ends, brinks)
+    let postures = joints::choose(&collider.neighbours, collider.postures.count(), &masks, &rates, ends, brinks)
         .expect("the checked route passes postures from start to goal");
     let exact = |asked: &[Option<f64>], posture: usize| -> Vec<f64> {
-        asked.iter().zip(collider.grid.joints(posture)).map(|(a, own)| a.unwrap_or(own)).collect()
+        asked.iter().zip(collider.postures.joints(posture)).map(|(a, own)| a.unwrap_or(*own)).collect()
     };
     let first = postures[0];
     let mut path = SearchPath {
@@ -305,7 +306,10 @@ fn with_joints<const W: usize>(
         moves: Vec::new(),
         expanded,
     };
-    path.then_to(SearchState { pose: query.start, joints: collider.grid.joints(first) }, SearchMove::Still);
+    path.then_to(
+        SearchState { pose: query.start, joints: collider.postures.joints(first).to_vec() },
+        SearchMove::Still,
+    );
     let drive_reverse = reverse_of_pieces(&checked.route, pieces);
     for (k, piece) in pieces.iter().enumerate() {
         let kind = match drive_reverse[k] {
@@ -313,7 +317,7 @@ fn with_joints<const W: usize>(
             Some(false) => SearchMove::Forward,
             Some(true) => SearchMove::Reverse,
         };
-        path.then_to(SearchState { pose: piece.to, joints: collider.grid.joints(postures[k + 1]) }, kind);
+        path.then_to(SearchState { pose: piece.to, joints: collider.postures.joints(postures[k + 1]).to_vec() }, kind);
     }
     let last = postures[postures.len() - 1];
     let end = path.states[path.states.len() - 1].pose;
@@ -347,13 +351,8 @@ fn reverse_of_pieces(route: &Route, pieces: &[BaseMotion]) -> Vec<Option<bool>> 
     out
 }
 
-/// Posture steps that there is time for while the base goes through a piece.
-fn steps_in_time(robot: &RobotModel, grid: &PostureGrid, piece: &BaseMotion) -> usize {
-    let time = piece.from.distance(piece.to) / robot.base.speed
-        + (piece.to.yaw - piece.from.yaw).abs() / robot.base.angular_speed.max(1e-6);
-    let steps = robot.joints.iter().enumerate().map(|(m, joint)| {
-        let step = grid.step(m);
-        if step > 0.0 { 0.7 * joint.limits.planning()[0] * time / step } else { f64::INFINITY }
-    });
-    steps.fold(f64::INFINITY, f64::min).min(1024.0) as usize
+/// Time that the base takes through a piece at least, s.
+fn time_of(robot: &RobotModel, piece: &BaseMotion) -> f64 {
+    piece.from.distance(piece.to) / robot.base.speed
+        + (piece.to.yaw - piece.from.yaw).abs() / robot.base.angular_speed.max(1e-6)
 }

@@ -1,0 +1,264 @@
+//! A roadmap of postures for many joints: those asked for at the ends, some in which the robot is folded up, some spread over all
+//! that there are, and the straight ways between them, sampled closely.
+//!
+//! (After Kavraki et al. 1996; obstacles are not looked at here but for each pose of the base, by `collide`. A robot that drives is
+//! best folded up, and most ways lead from the posture at the start by way of a folded one to that at the goal.)
+
+use std::collections::BTreeSet;
+
+use super::posture::{MOST_POSTURES, Roadmap};
+use crate::math::halton;
+use crate::robot::RobotModel;
+
+/// Time that a step may take at the joints' planning speeds, s, if there is room for as many postures.
+const STEP_TIME: f64 = 0.12;
+/// Postures that are looked at for those in which the robot is folded up.
+const SURVEYED: usize = 192;
+/// Folded postures, and others.
+const FOLDED: usize = 6;
+const SPREAD: usize = 18;
+/// Postures for an end that leaves joints open.
+const OPEN: usize = 6;
+/// Ways from an end to the nearest others, and from each of the others.
+const WAYS: [usize; 2] = [6, 2];
+/// What a metre of height is worth in metres of width, of a folded robot.
+const HEIGHT: f64 = 0.3;
+/// Steps of the descent towards a folded posture, shares of the joints' ranges.
+const DESCENT: [f64; 4] = [0.12, 0.06, 0.03, 0.015];
+
+/// What is known of a robot that is built a roadmap for.
+struct Builder<'a> {
+    robot: &'a RobotModel,
+    pairs: Vec<[usize; 2]>,
+    ranges: Vec<[f64; 2]>,
+    /// Planning speeds.
+    speeds: Vec<f64>,
+    /// Shapes that joints move.
+    moved: Vec<usize>,
+}
+
+/// Postures and the ways between them, for joint values asked for at start and goal. `near`: values about which endless joints are
+/// sampled. Another variant has other postures.
+pub(super) fn build(
+    robot: &RobotModel,
+    near: &[f64],
+    asked: [&[Option<f64>]; 2],
+    variant: usize,
+) -> (Vec<Vec<f64>>, Roadmap) {
+    let range = |(joint, near): (&crate::robot::MovingJoint, &f64)| {
+        let turn = std::f64::consts::PI;
+        [
+            if joint.lower.is_finite() { joint.lower } else { near - turn },
+            if joint.upper.is_finite() { joint.upper } else { near + turn },
+        ]
+    };
+    let moved = (0..robot.shapes.len()).filter(|s| robot.is_moved(robot.shapes[*s].body)).collect();
+    let builder = Builder {
+        robot,
+        pairs: robot.self_pairs(),
+        ranges: robot.joints.iter().zip(near).map(range).collect(),
+        speeds: robot.joints.iter().map(|joint| joint.limits.planning()[0]).collect(),
+        moved,
+    };
+    builder.roadmap(asked, variant)
+}
+
+impl Builder<'_> {
+    fn roadmap(&self, asked: [&[Option<f64>]; 2], variant: usize) -> (Vec<Vec<f64>>, Roadmap) {
+        let (folded, mut keys) = self.folded_and_spread(variant);
+        let mut ends: [Vec<u32>; 2] = Default::default();
+        for (own, asked) in ends.iter_mut().zip(asked) {
+            for posture in self.of_end(asked, &keys[..folded]) {
+                let known = keys.iter().position(|key| *key == posture);
+                own.push(known.unwrap_or(keys.len()) as u32);
+                if known.is_none() {
+                    keys.push(posture);
+                }
+            }
+        }
+        let ways = self.ways(&keys, folded, &ends);
+        self.sampled(keys, ends, &ways)
+    }
+
+    /// Time between two postures, each joint at its planning speed, s.
+    fn time(&self, a: &[f64], b: &[f64]) -> f64 {
+        a.iter().zip(b).zip(&self.speeds).map(|((a, b), speed)| (a - b).abs() / speed).fold(0.0, f64::max)
+    }
+
+    fn touches(&self, q: &[f64]) -> bool {
+        !self.pairs.is_empty() && self.robot.touching(&self.pairs, q).is_some()
+    }
+
+    /// Whether no links touch on the straight way between two postures, looked at as closely as it will be sampled.
+    fn is_open(&self, a: &[f64], b: &[f64]) -> bool {
+        let steps = (self.time(a, b) / STEP_TIME).ceil() as usize;
+        (1..steps).all(|k| !self.touches(&between(a, b, k as f64 / steps as f64)))
+    }
+
+    /// How wide and tall the robot's moving parts are, m.
+    fn size(&self, q: &[f64]) -> f64 {
+        let poses = self.robot.shape_poses(q);
+        let of = |s: &usize| {
+            let (pose, convex) = (&poses[*s], &self.robot.shapes[*s].convex);
+            let (mut wide, mut top) = (0.0f64, f64::NEG_INFINITY);
+            let [x, y, z] = convex.half_extents();
+            for k in 0..8 {
+                let sign = |bit: usize, half: f64| if k >> bit & 1 == 0 { -half } else { half };
+                let corner = pose * nalgebra::Point3::new(sign(0, x), sign(1, y), sign(2, z));
+                wide = wide.max(corner.x.hypot(corner.y));
+                top = top.max(corner.z);
+            }
+            (wide, top)
+        };
+        let (wide, top) = self.moved.iter().map(of).fold((0.0f64, 0.0f64), |a, b| (a.0.max(b.0), a.1.max(b.1)));
+        wide + HEIGHT * top
+    }
+
+    fn sample(&self, index: usize) -> Vec<f64> {
+        let value = |(joint, [low, high]): (usize, &[f64; 2])| low + halton::value(joint, index) * (high - low);
+        self.ranges.iter().enumerate().map(value).collect()
+    }
+
+    /// Postures in which the robot is folded up, and how many; behind them such as lie far apart.
+    fn folded_and_spread(&self, variant: usize) -> (usize, Vec<Vec<f64>>) {
+        let first = 1 + variant * SURVEYED;
+        let mut surveyed: Vec<(f64, Vec<f64>)> = (first..first + SURVEYED)
+            .map(|index| {
+                let q = self.sample(index);
+                (self.size(&q), q)
+            })
+            .collect();
+        surveyed.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut keys: Vec<Vec<f64>> = Vec::new();
+        let mut rest: Vec<f64> = vec![0.0; self.ranges.len()];
+        rest.iter_mut().zip(&self.ranges).for_each(|(v, [low, high])| *v = v.clamp(*low, *high));
+        let seeds = std::iter::once(&rest).chain(surveyed.iter().map(|(_, q)| q));
+        for seed in seeds {
+            if keys.len() == FOLDED {
+                break;
+            }
+            if self.touches(seed) {
+                continue;
+            }
+            let folded = self.fold(seed.clone());
+            if keys.iter().all(|key| self.time(key, &folded) > 4.0 * STEP_TIME) {
+                keys.push(folded);
+            }
+        }
+        let folded = keys.len();
+        // The smaller half, each time the one farthest from all there are.
+        let mut left: Vec<&Vec<f64>> = surveyed[..SURVEYED / 2].iter().map(|(_, q)| q).collect();
+        while keys.len() < folded + SPREAD && !left.is_empty() {
+            let apart = |q: &[f64]| keys.iter().map(|key| self.time(key, q)).fold(f64::INFINITY, f64::min);
+            let farthest = (0..left.len()).max_by(|a, b| apart(left[*a]).total_cmp(&apart(left[*b]))).unwrap_or(0);
+            let q = left.swap_remove(farthest);
+            if !self.touches(q) {
+                keys.push(q.clone());
+            }
+        }
+        (folded, keys)
+    }
+
+    /// A posture nearby, no part of which reaches as far.
+    fn fold(&self, mut q: Vec<f64>) -> Vec<f64> {
+        let mut size = self.size(&q);
+        for share in DESCENT {
+            let mut gained = true;
+            while gained {
+                gained = false;
+                for joint in 0..q.len() {
+                    let [low, high] = self.ranges[joint];
+                    for step in [share, -share] {
+                        let before = q[joint];
+                        q[joint] = (before + step * (high - low)).clamp(low, high);
+                        let found = self.size(&q);
+                        if found < size - 1e-3 && !self.touches(&q) {
+                            (size, gained) = (found, true);
+                            break;
+                        }
+                        q[joint] = before;
+                    }
+                }
+            }
+        }
+        q
+    }
+
+    /// Postures for an end: the one asked for; where joints are open, those as in some folded postures. None where all are open.
+    fn of_end(&self, asked: &[Option<f64>], folded: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        if asked.iter().all(Option::is_none) {
+            return Vec::new();
+        }
+        let with = |own: &Vec<f64>| -> Vec<f64> { asked.iter().zip(own).map(|(a, own)| a.unwrap_or(*own)).collect() };
+        if asked.iter().all(Option::is_some) {
+            return vec![with(&vec![0.0; asked.len()])];
+        }
+        let more = (1..=OPEN).map(|index| self.sample(index));
+        folded.iter().cloned().chain(more).map(|own| with(&own)).take(OPEN + folded.len() / 2).collect()
+    }
+
+    /// Pairs of keys that are joined.
+    fn ways(&self, keys: &[Vec<f64>], folded: usize, ends: &[Vec<u32>; 2]) -> Vec<[usize; 2]> {
+        let mut ways = BTreeSet::new();
+        let is_end = |key: usize| ends.iter().flatten().any(|end| *end as usize == key);
+        let mut known = std::collections::BTreeMap::new();
+        let mut join = |a: usize, b: usize| {
+            let way = [a.min(b), a.max(b)];
+            let open = a != b && *known.entry(way).or_insert_with(|| self.is_open(&keys[way[0]], &keys[way[1]]));
+            if open {
+                ways.insert(way);
+            }
+            open
+        };
+        for a in 0..keys.len() {
+            let mut others: Vec<usize> = (0..keys.len()).filter(|b| *b != a).collect();
+            others.sort_by(|b, c| self.time(&keys[a], &keys[*b]).total_cmp(&self.time(&keys[a], &keys[*c])));
+            let wanted = WAYS[usize::from(!is_end(a))];
+            others.iter().filter(|b| **b >= folded).filter(|b| join(a, **b)).take(wanted).count();
+            if is_end(a) || a < folded {
+                // The folded ones, and the other end.
+                others.iter().filter(|b| **b < folded || is_end(a) && is_end(**b)).for_each(|b| {
+                    join(a, *b);
+                });
+            } else {
+                others.iter().filter(|b| **b < folded).find(|b| join(a, **b));
+            }
+        }
+        ways.into_iter().collect()
+    }
+
+    /// All ways as postures close together, as close as their greatest number allows.
+    fn sampled(&self, keys: Vec<Vec<f64>>, ends: [Vec<u32>; 2], ways: &[[usize; 2]]) -> (Vec<Vec<f64>>, Roadmap) {
+        let times: Vec<f64> = ways.iter().map(|[a, b]| self.time(&keys[*a], &keys[*b])).collect();
+        let inner = |step: f64| times.iter().map(|time| (time / step).ceil().max(1.0) as usize - 1).sum::<usize>();
+        let mut step = STEP_TIME;
+        while keys.len() + inner(step) > MOST_POSTURES {
+            step *= 1.05;
+        }
+        let mut values = keys;
+        let mut neighbours: Vec<Vec<u32>> = vec![Vec::new(); values.len()];
+        let mut longest = 0.0f64;
+        for ([a, b], time) in ways.iter().zip(&times) {
+            let steps = (time / step).ceil().max(1.0) as usize;
+            longest = longest.max(time / steps as f64);
+            let mut last = *a;
+            for k in 1..=steps {
+                let next = if k == steps { *b } else { values.len() };
+                if k < steps {
+                    values.push(between(&values[*a], &values[*b], k as f64 / steps as f64));
+                    neighbours.push(Vec::new());
+                }
+                neighbours[last].push(next as u32);
+                neighbours[next].push(last as u32);
+                last = next;
+            }
+        }
+        neighbours.iter_mut().for_each(|own| own.sort_unstable());
+        (values, Roadmap { neighbours, step_time: longest.max(1e-6), ends })
+    }
+}
+
+/// The posture so far on the straight way from one to another.
+fn between(a: &[f64], b: &[f64], share: f64) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect()
+}
