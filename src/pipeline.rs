@@ -277,7 +277,7 @@ fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, compile: &Compil
         let options = |margin: f64| SearchOptions { clearance: mission.clearance + margin, reverse: mission.reverse };
         // What fits only without the margin is found too, and what is absent is absent without it.
         search::search(map, &field, robot, &query, &options(SEARCH_MARGIN)).or_else(|error| match error {
-            SearchError::OffMap { .. } | SearchError::Limit { .. } => Err(error),
+            SearchError::OffMap { .. } | SearchError::Limit { .. } | SearchError::Sampled { .. } => Err(error),
             _ => search::search(map, &field, robot, &query, &options(0.0)),
         })
     });

@@ -208,8 +208,11 @@ impl<'a, const W: usize> Collider<'a, W> {
 
     /// Postures in which links of the robot touch each other.
     pub fn touching(&self) -> Bits<W> {
-        let pairs = self.robot.self_pairs();
         let mut out = Bits::EMPTY;
+        if !self.postures.is_exhaustive() {
+            return out; // a roadmap holds none
+        }
+        let pairs = self.robot.self_pairs();
         let touch = |p: &usize| self.robot.touching(&pairs, self.postures.joints(*p)).is_some();
         (0..self.postures.count()).filter(|_| !pairs.is_empty()).filter(touch).for_each(|p| out.insert(p));
         out

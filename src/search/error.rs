@@ -37,6 +37,12 @@ pub enum SearchError {
         /// States expanded.
         expanded: usize,
     },
+    /// The base alone gets there; with what moves on it no way was found among the postures that were sampled.
+    #[error("no way to the goal was found with {postures} sampled postures of the joints; the base alone would get there")]
+    Sampled {
+        /// Postures in the roadmap.
+        postures: usize,
+    },
     /// Out of memory that the search allows itself.
     #[error("gave up after {labels} partial paths: neither a way was found nor its absence proven")]
     Limit {
@@ -199,6 +205,9 @@ impl Describe for SearchError {
             Self::Marginal { expanded } => Diagnostic::failure("search/marginal", self)
                 .hint("lower `clearance_m` by a millimetre")
                 .number("expanded", *expanded),
+            Self::Sampled { postures } => Diagnostic::failure("search/no-posture", self)
+                .hint("free the goal's joints or heading, give joint values that keep farther from obstacles, or lower `clearance_m`")
+                .number("postures", *postures),
             Self::Limit { labels } => Diagnostic::failure("search/limit", self)
                 .hint("use a coarser map or split the mission")
                 .number("labels", *labels),

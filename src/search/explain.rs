@@ -7,7 +7,7 @@ use super::heuristic::{self, NEIGHBOURS};
 use super::lattice::Lattice;
 use super::posture::Postures;
 use super::solve::{self, End, Problem, Solver};
-use super::{Contact, SearchPath, SearchState};
+use super::{Contact, Query, SearchPath, SearchState};
 use crate::geom::Pose2;
 use crate::robot::{Convex, RobotModel};
 
@@ -52,6 +52,21 @@ pub(super) fn blocked<const W: usize>(problem: &Problem<'_>, postures: Postures,
     match end {
         End::Start => SearchError::StartBlocked(blocked),
         End::Goal => SearchError::GoalBlocked(blocked),
+    }
+}
+
+/// Why no way was found with a roadmap of postures: that there is none even for the base alone, or just that none was found.
+pub(super) fn not_found<const W: usize>(solver: &Solver<'_, W>) -> SearchError {
+    let Problem { robot, query, .. } = solver.problem;
+    let mut base = robot.clone();
+    base.shapes.retain(|shape| !robot.is_moved(shape.body));
+    base.joints.clear();
+    base.bodies.iter_mut().for_each(|body| body.motion = None);
+    let query = Query { start_joints: Vec::new(), goal_joints: Vec::new(), ..query.clone() };
+    let problem = Problem { robot: &base, query: &query, ..solver.problem };
+    match super::solve::<1>(problem, Postures::new(&base, &query, 0)) {
+        Err(error @ SearchError::Exhausted(_)) => error,
+        _ => SearchError::Sampled { postures: solver.collider.postures.count() },
     }
 }
 

@@ -42,12 +42,19 @@ pub(super) struct Roadmap {
 
 /// Most postures there can be: bits of the widest mask.
 pub(super) const MOST_POSTURES: usize = 1024;
+/// Most postures of a roadmap that is tried first.
+pub(super) const FEW_POSTURES: usize = 256;
 /// Most joints that are sampled as a grid.
 const GRID_JOINTS: usize = 2;
 
 impl Postures {
+    /// How many sets of postures there are to try, small ones first.
+    pub fn levels(robot: &RobotModel) -> usize {
+        if robot.joints.len() <= GRID_JOINTS { 1 } else { 2 }
+    }
+
     /// Those for a robot and a question. A joint without limits is sampled one turn about its value at the start.
-    pub fn new(robot: &RobotModel, query: &Query, variant: usize) -> Self {
+    pub fn new(robot: &RobotModel, query: &Query, level: usize) -> Self {
         let near = |(asked, joint): (&Option<f64>, &crate::robot::MovingJoint)| {
             asked.unwrap_or(0f64.clamp(joint.lower, joint.upper))
         };
@@ -55,7 +62,7 @@ impl Postures {
         if robot.joints.len() <= GRID_JOINTS {
             return Self::grid(robot, &near);
         }
-        let (values, roadmap) = roadmap::build(robot, &near, [&query.start_joints, &query.goal_joints], variant);
+        let (values, roadmap) = roadmap::build(robot, &near, [&query.start_joints, &query.goal_joints], level);
         Self { values, steps: Steps::Roadmap(roadmap) }
     }
 

@@ -6,21 +6,33 @@
 
 use std::collections::BTreeSet;
 
-use super::posture::{MOST_POSTURES, Roadmap};
+use super::posture::{FEW_POSTURES, MOST_POSTURES, Roadmap};
 use crate::math::halton;
 use crate::robot::RobotModel;
 
 /// Time that a step may take at the joints' planning speeds, s, if there is room for as many postures.
 const STEP_TIME: f64 = 0.12;
-/// Postures that are looked at for those in which the robot is folded up.
-const SURVEYED: usize = 192;
-/// Folded postures, and others.
-const FOLDED: usize = 6;
-const SPREAD: usize = 18;
-/// Postures for an end that leaves joints open.
-const OPEN: usize = 6;
-/// Ways from an end to the nearest others, and from each of the others.
-const WAYS: [usize; 2] = [6, 2];
+
+/// How large a roadmap is.
+struct Size {
+    /// Postures that are looked at for those in which the robot is folded up.
+    surveyed: usize,
+    /// Folded postures, and others.
+    folded: usize,
+    spread: usize,
+    /// Postures for an end that leaves joints open.
+    open: usize,
+    /// Ways from an end to the nearest others, and from each of the others.
+    ways: [usize; 2],
+    /// Most postures.
+    most: usize,
+}
+
+/// Enough for most, and enough for nearly all.
+const SIZES: [Size; 2] = [
+    Size { surveyed: 64, folded: 5, spread: 3, open: 4, ways: [2, 1], most: FEW_POSTURES },
+    Size { surveyed: 192, folded: 6, spread: 18, open: 6, ways: [6, 2], most: MOST_POSTURES },
+];
 /// What a metre of height is worth in metres of width, of a folded robot.
 const HEIGHT: f64 = 0.3;
 /// Steps of the descent towards a folded posture, shares of the joints' ranges.
@@ -35,15 +47,16 @@ struct Builder<'a> {
     speeds: Vec<f64>,
     /// Shapes that joints move.
     moved: Vec<usize>,
+    size: &'static Size,
 }
 
 /// Postures and the ways between them, for joint values asked for at start and goal. `near`: values about which endless joints are
-/// sampled. Another variant has other postures.
+/// sampled. Level 0 is a small roadmap, level 1 a large one.
 pub(super) fn build(
     robot: &RobotModel,
     near: &[f64],
     asked: [&[Option<f64>]; 2],
-    variant: usize,
+    level: usize,
 ) -> (Vec<Vec<f64>>, Roadmap) {
     let range = |(joint, near): (&crate::robot::MovingJoint, &f64)| {
         let turn = std::f64::consts::PI;
@@ -59,13 +72,14 @@ pub(super) fn build(
         ranges: robot.joints.iter().zip(near).map(range).collect(),
         speeds: robot.joints.iter().map(|joint| joint.limits.planning()[0]).collect(),
         moved,
+        size: &SIZES[level],
     };
-    builder.roadmap(asked, variant)
+    builder.roadmap(asked)
 }
 
 impl Builder<'_> {
-    fn roadmap(&self, asked: [&[Option<f64>]; 2], variant: usize) -> (Vec<Vec<f64>>, Roadmap) {
-        let (folded, mut keys) = self.folded_and_spread(variant);
+    fn roadmap(&self, asked: [&[Option<f64>]; 2]) -> (Vec<Vec<f64>>, Roadmap) {
+        let (folded, mut keys) = self.folded_and_spread();
         let mut ends: [Vec<u32>; 2] = Default::default();
         for (own, asked) in ends.iter_mut().zip(asked) {
             for posture in self.of_end(asked, &keys[..folded]) {
@@ -96,7 +110,7 @@ impl Builder<'_> {
     }
 
     /// How wide and tall the robot's moving parts are, m.
-    fn size(&self, q: &[f64]) -> f64 {
+    fn extent(&self, q: &[f64]) -> f64 {
         let poses = self.robot.shape_poses(q);
         let of = |s: &usize| {
             let (pose, convex) = (&poses[*s], &self.robot.shapes[*s].convex);
@@ -120,12 +134,12 @@ impl Builder<'_> {
     }
 
     /// Postures in which the robot is folded up, and how many; behind them such as lie far apart.
-    fn folded_and_spread(&self, variant: usize) -> (usize, Vec<Vec<f64>>) {
-        let first = 1 + variant * SURVEYED;
-        let mut surveyed: Vec<(f64, Vec<f64>)> = (first..first + SURVEYED)
+    fn folded_and_spread(&self) -> (usize, Vec<Vec<f64>>) {
+        let Size { surveyed: count, folded, spread, .. } = *self.size;
+        let mut surveyed: Vec<(f64, Vec<f64>)> = (1..=count)
             .map(|index| {
                 let q = self.sample(index);
-                (self.size(&q), q)
+                (self.extent(&q), q)
             })
             .collect();
         surveyed.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -134,7 +148,7 @@ impl Builder<'_> {
         rest.iter_mut().zip(&self.ranges).for_each(|(v, [low, high])| *v = v.clamp(*low, *high));
         let seeds = std::iter::once(&rest).chain(surveyed.iter().map(|(_, q)| q));
         for seed in seeds {
-            if keys.len() == FOLDED {
+            if keys.len() == folded {
                 break;
             }
             if self.touches(seed) {
@@ -147,8 +161,8 @@ impl Builder<'_> {
         }
         let folded = keys.len();
         // The smaller half, each time the one farthest from all there are.
-        let mut left: Vec<&Vec<f64>> = surveyed[..SURVEYED / 2].iter().map(|(_, q)| q).collect();
-        while keys.len() < folded + SPREAD && !left.is_empty() {
+        let mut left: Vec<&Vec<f64>> = surveyed[..count / 2].iter().map(|(_, q)| q).collect();
+        while keys.len() < folded + spread && !left.is_empty() {
             let apart = |q: &[f64]| keys.iter().map(|key| self.time(key, q)).fold(f64::INFINITY, f64::min);
             let farthest = (0..left.len()).max_by(|a, b| apart(left[*a]).total_cmp(&apart(left[*b]))).unwrap_or(0);
             let q = left.swap_remove(farthest);
@@ -161,7 +175,7 @@ impl Builder<'_> {
 
     /// A posture nearby, no part of which reaches as far.
     fn fold(&self, mut q: Vec<f64>) -> Vec<f64> {
-        let mut size = self.size(&q);
+        let mut size = self.extent(&q);
         for share in DESCENT {
             let mut gained = true;
             while gained {
@@ -171,7 +185,7 @@ impl Builder<'_> {
                     for step in [share, -share] {
                         let before = q[joint];
                         q[joint] = (before + step * (high - low)).clamp(low, high);
-                        let found = self.size(&q);
+                        let found = self.extent(&q);
                         if found < size - 1e-3 && !self.touches(&q) {
                             (size, gained) = (found, true);
                             break;
@@ -193,8 +207,8 @@ impl Builder<'_> {
         if asked.iter().all(Option::is_some) {
             return vec![with(&vec![0.0; asked.len()])];
         }
-        let more = (1..=OPEN).map(|index| self.sample(index));
-        folded.iter().cloned().chain(more).map(|own| with(&own)).take(OPEN + folded.len() / 2).collect()
+        let more = (1..=self.size.open).map(|index| self.sample(index));
+        folded.iter().cloned().chain(more).map(|own| with(&own)).take(self.size.open + folded.len() / 2).collect()
     }
 
     /// Pairs of keys that are joined.
@@ -213,7 +227,7 @@ impl Builder<'_> {
         for a in 0..keys.len() {
             let mut others: Vec<usize> = (0..keys.len()).filter(|b| *b != a).collect();
             others.sort_by(|b, c| self.time(&keys[a], &keys[*b]).total_cmp(&self.time(&keys[a], &keys[*c])));
-            let wanted = WAYS[usize::from(!is_end(a))];
+            let wanted = self.size.ways[usize::from(!is_end(a))];
             others.iter().filter(|b| **b >= folded).filter(|b| join(a, **b)).take(wanted).count();
             if is_end(a) || a < folded {
                 // The folded ones, and the other end.
@@ -232,7 +246,7 @@ impl Builder<'_> {
         let times: Vec<f64> = ways.iter().map(|[a, b]| self.time(&keys[*a], &keys[*b])).collect();
         let inner = |step: f64| times.iter().map(|time| (time / step).ceil().max(1.0) as usize - 1).sum::<usize>();
         let mut step = STEP_TIME;
-        while keys.len() + inner(step) > MOST_POSTURES {
+        while keys.len() + inner(step) > self.size.most {
             step *= 1.05;
         }
         let mut values = keys;

@@ -93,6 +93,10 @@ impl<'a, const W: usize> Solver<'a, W> {
         Ok(Self { problem, collider, lattice, core, start_postures, goal_postures, touching })
     }
 
+    pub fn ends(&self) -> [Bits<W>; 2] {
+        [self.start_postures, self.goal_postures]
+    }
+
     /// Takes the postures in which links touch back in; whether there were any. What comes of it the certificate judges, which names the
     /// links where a search could only say that there is no way.
     pub fn let_links_touch(&mut self) -> bool {
