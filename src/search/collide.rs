@@ -54,7 +54,7 @@ const TILE_MARGIN: f64 = 0.13;
 /// Interpolated distances are too high by at most this share of a cell (`MATH` section 4) ...
 const TOO_HIGH: f64 = 0.26;
 /// ... and too low by at most this.
-const TOO_LOW: f64 = 0.8661;
+pub(super) const TOO_LOW: f64 = 0.8661;
 /// Distances are found to this, m.
 const TOLERANCE: f64 = 2e-4;
 /// ... but where the clearance is kept anyway, to this.
@@ -89,6 +89,15 @@ impl Course {
             near: OnceCell::new(),
         }
     }
+}
+
+/// A ball in the robot that no joint moves.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mast {
+    /// Base frame, m.
+    pub centre: Vector3<f64>,
+    /// m.
+    pub radius: f64,
 }
 
 /// Obstacles near a motion.
@@ -242,6 +251,21 @@ impl<'a, const W: usize> Collider<'a, W> {
             }
         }
         free
+    }
+
+    /// What moving shapes take up in every posture that is searched: balls in them that no joint moves.
+    pub fn masts(&self) -> Vec<Mast> {
+        let stays = |placed: &&Placed| {
+            let first = placed.poses[0].centre;
+            placed.poses.iter().all(|pose| (pose.centre - first).norm() < 1e-6)
+        };
+        let of = |placed: &Placed| {
+            let ball = placed.balls.iter().find(|ball| (ball.centres[0] - placed.poses[0].centre).norm() < 1e-6);
+            let radius = placed.half.iter().copied().fold(f64::INFINITY, f64::min);
+            ball.and_then(|ball| ball.inner)
+                .map(|inner| Mast { centre: placed.poses[0].centre, radius: inner.min(radius) })
+        };
+        self.moving.iter().filter(stays).filter_map(of).collect()
     }
 
     /// Where a straight drive is tightest for the deepest point of the rigid shapes, m of it; `None`: it does not get through.

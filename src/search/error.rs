@@ -38,7 +38,9 @@ pub enum SearchError {
         expanded: usize,
     },
     /// The base alone gets there; with what moves on it no way was found among the postures that were sampled.
-    #[error("no way to the goal was found with {postures} sampled postures of the joints; the base alone would get there")]
+    #[error(
+        "no way to the goal was found with {postures} sampled postures of the joints, and none for the base alone was ruled out"
+    )]
     Sampled {
         /// Postures in the roadmap.
         postures: usize,

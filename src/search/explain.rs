@@ -6,7 +6,7 @@ use super::error::{Absence, Blocked, SearchError, Tightest};
 use super::heuristic::{self, NEIGHBOURS};
 use super::lattice::Lattice;
 use super::posture::Postures;
-use super::solve::{self, End, Problem, Solver};
+use super::solve::{self, End, NoPath, Problem, Solver};
 use super::{Contact, Query, SearchPath, SearchState};
 use crate::geom::Pose2;
 use crate::robot::{Convex, RobotModel};
@@ -21,6 +21,8 @@ const THINNER: f64 = 0.3;
 const HALVINGS: usize = 8;
 /// Labels that the lattice search may make for a thinner robot.
 const QUICK: usize = 60_000;
+/// Labels that it may make for the base alone of a robot with many joints.
+const MOST_LABELS_ALONE: usize = 300_000;
 /// A path is looked along in steps of this, m and rad.
 const STEP: f64 = 0.05;
 /// An end is at fault whose space is smaller than this share of the other's.
@@ -64,9 +66,13 @@ pub(super) fn not_found<const W: usize>(solver: &Solver<'_, W>) -> SearchError {
     base.bodies.iter_mut().for_each(|body| body.motion = None);
     let query = Query { start_joints: Vec::new(), goal_joints: Vec::new(), ..query.clone() };
     let problem = Problem { robot: &base, query: &query, ..solver.problem };
-    match super::solve::<1>(problem, Postures::new(&base, &query, 0)) {
-        Err(error @ SearchError::Exhausted(_)) => error,
-        _ => SearchError::Sampled { postures: solver.collider.postures.count() },
+    let sampled = SearchError::Sampled { postures: solver.collider.postures.count() };
+    let Ok(alone) = Solver::<1>::new(problem, Postures::new(&base, &query, 0)) else { return sampled };
+    match alone.guided().map_or_else(|| alone.on_the_lattice(MOST_LABELS_ALONE), Ok) {
+        Err(NoPath::Exhausted { core_clearances, closest, expanded }) => {
+            absent(&alone, &core_clearances, closest, expanded)
+        }
+        _ => sampled,
     }
 }
 

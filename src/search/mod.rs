@@ -126,6 +126,9 @@ pub fn search(
     }
 }
 
+/// Labels that the lattice search may make with a roadmap of postures: it proves nothing, and each takes long.
+const MOST_LABELS_OF_A_ROADMAP: usize = 10_000;
+
 fn solve<const W: usize>(problem: Problem<'_>, postures: Postures) -> Result<SearchPath, SearchError> {
     let mut solver = match Solver::<W>::new(problem, postures.clone()) {
         Ok(solver) => solver,
@@ -135,10 +138,15 @@ fn solve<const W: usize>(problem: Problem<'_>, postures: Postures) -> Result<Sea
         if let Some(path) = solver.guided() {
             return Ok(path);
         }
-        let none = match solver.on_the_lattice(astar::MOST_LABELS) {
+        let exhaustive = solver.collider.postures.is_exhaustive();
+        let labels = if exhaustive { astar::MOST_LABELS } else { MOST_LABELS_OF_A_ROADMAP };
+        let none = match solver.on_the_lattice(labels) {
             Ok(path) => return Ok(path),
             Err(none) => none,
         };
+        if !exhaustive {
+            return Err(explain::not_found(&solver));
+        }
         if !matches!(none, NoPath::Limit { .. }) && solver.let_links_touch() {
             continue;
         }

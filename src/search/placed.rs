@@ -76,7 +76,7 @@ impl Posed {
     }
 
     /// No point of a shape is farther from the z axis than this, m; exact for boxes, hulls and balls.
-    fn farthest_from_axis(&self, convex: &Convex) -> f64 {
+    pub fn farthest_from_axis(&self, convex: &Convex) -> f64 {
         let flat = |p: Vector3<f64>| p.x.hypot(p.y);
         let of = |points: &mut dyn Iterator<Item = Vector3<f64>>| {
             points.map(|p| flat(self.centre + self.rotation * p)).fold(0.0, f64::max)

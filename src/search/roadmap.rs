@@ -159,6 +159,8 @@ impl Builder<'_> {
                 keys.push(folded);
             }
         }
+        // The most folded one first.
+        keys.sort_by(|a, b| self.extent(a).total_cmp(&self.extent(b)));
         let folded = keys.len();
         // The smaller half, each time the one farthest from all there are.
         let mut left: Vec<&Vec<f64>> = surveyed[..count / 2].iter().map(|(_, q)| q).collect();

@@ -2,7 +2,7 @@
 
 use super::astar::{self, AStar, Outcome};
 use super::bits::Bits;
-use super::collide::{BaseMotion, Collider};
+use super::collide::{BaseMotion, Collider, Mast, TOO_LOW};
 use super::guide::{self, Guide};
 use super::headed::{self, Headed};
 use super::heuristic::{self, Core, CostToGo};
@@ -93,10 +93,6 @@ impl<'a, const W: usize> Solver<'a, W> {
         Ok(Self { problem, collider, lattice, core, start_postures, goal_postures, touching })
     }
 
-    pub fn ends(&self) -> [Bits<W>; 2] {
-        [self.start_postures, self.goal_postures]
-    }
-
     /// Takes the postures in which links touch back in; whether there were any. What comes of it the certificate judges, which names the
     /// links where a search could only say that there is no way.
     pub fn let_links_touch(&mut self) -> bool {
@@ -129,12 +125,25 @@ impl<'a, const W: usize> Solver<'a, W> {
         path.length() + turn_cost(self.problem.robot) * turned
     }
 
-    /// The clearance of the base's core about a position, and the least with which the base may pass there, m.
+    /// The clearance of the base's core about a position, and the least with which the base may pass there, m. So is that of
+    /// what no joint moves.
     fn guessed_clearance(&self) -> (impl Fn([f64; 2]) -> f64 + 'a, f64) {
-        let Problem { esdf, options, .. } = self.problem;
+        let Problem { map, esdf, options, .. } = self.problem;
         let core = self.core;
+        // The field may say too little by so much: nothing that fits is shut out.
+        let slack = TOO_LOW * map.resolution;
         let [x, y] = core.offset;
-        (move |place| core.guessed_clearance(esdf, place), options.clearance - x.hypot(y))
+        let least = options.clearance - x.hypot(y);
+        let masts = self.collider.masts();
+        let guess = move |[x, y]: [f64; 2]| {
+            let own = core.guessed_clearance(esdf, [x, y]);
+            let off = |mast: &Mast| mast.centre.x.hypot(mast.centre.y);
+            let of_mast = |mast: &Mast| {
+                slack + esdf.distance([x, y, mast.centre.z]) - mast.radius + off(mast) + least - options.clearance
+            };
+            masts.iter().map(of_mast).fold(own, f64::min)
+        };
+        (guess, least)
     }
 
     /// The cheapest way of metres and turns, as often as it is worth a try, and after how many that were blocked.
