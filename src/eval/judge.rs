@@ -21,6 +21,8 @@ use crate::trajectory::{Leg, Trajectory, steered_curve::SteeredCurve};
 pub struct Judged {
     /// The scene.
     pub id: String,
+    /// What sort of room it is.
+    pub kind: Option<String>,
     /// Its boxes.
     pub boxes: usize,
     /// Proven; else [`Judged::failure`] says why not.
@@ -110,6 +112,7 @@ pub fn judge(
     timings.extend(&outcome.timings);
     let judged = Judged {
         id: scene.id.clone(),
+        kind: scene.kind.clone(),
         boxes: scene.boxes.len(),
         certified: report.status == Status::Certified,
         failure: report.failure.clone(),

@@ -7,6 +7,7 @@ fn scene(id: &str, boxes: usize, time: f64, alpha: f64) -> Judged {
     let excess = Some(AlphaExcess { peak: alpha, share: 0.1 });
     Judged {
         id: id.into(),
+        kind: None,
         boxes,
         certified: true,
         failure: None,
