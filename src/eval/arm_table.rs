@@ -29,6 +29,10 @@ pub struct ArmRow {
     pub length_m: f64,
     /// The same of a time that no plan can beat, from start to goal without obstacles and arm, s.
     pub bound_s: f64,
+    /// Of the certified ones, how many reach below the floor with a link that a joint moves: the floor is no obstacle of a scene.
+    pub below_floor: usize,
+    /// The lowest that such a link gets in any of them, m.
+    pub lowest_m: Option<f64>,
     /// How many failed with each code, such as `search/exhausted`.
     pub failures: BTreeMap<String, usize>,
 }
@@ -38,6 +42,7 @@ impl ArmRow {
     fn of(kind: &str, judged: &[Judged]) -> Self {
         let driven = || certified(judged).filter_map(|j| j.driven);
         let count = certified(judged).count();
+        let lowest = || certified(judged).filter_map(|j| j.lowest);
         let mut failures = BTreeMap::new();
         for failed in judged.iter().filter(|j| !j.certified) {
             let code = failed.failure.as_ref().map_or("unknown", |f| f.code.as_str());
@@ -53,6 +58,8 @@ impl ArmRow {
             time_s: mean(driven().map(|m| m.time_s)),
             length_m: mean(driven().map(|m| m.length_m)),
             bound_s: mean(certified(judged).map(|j| j.bound.1)),
+            below_floor: lowest().filter(|low| *low < 0.0).count(),
+            lowest_m: lowest().reduce(f64::min),
             failures,
         }
     }
@@ -108,6 +115,13 @@ pub(super) fn render(judged: &[Judged]) -> String {
     text += "TopAY: 120 pairs a kind of its own benchmark and robot, measured by the project's owner; ours: rooms drawn after that benchmark,\n\
              with a way for the base alone, at the same limits.\n";
     for row in &rows {
+        if let (1.., Some(lowest)) = (row.below_floor, row.lowest_m) {
+            let reach = if row.below_floor == 1 { "reaches" } else { "reach" };
+            text += &format!(
+                "{}: {} of the certified {reach} below the floor, the lowest {:.2} m: it is no obstacle of a scene\n",
+                row.kind, row.below_floor, -lowest
+            );
+        }
         for (code, count) in &row.failures {
             text += &format!("{}: {count} failed with {code}\n", row.kind);
         }

@@ -45,6 +45,7 @@ fn scene(suite: Option<Suite>, judged: &Judged) -> Value {
         "driven": judged.driven,
         "bound_s": judged.bound.1,
         "turns": judged.turns,
+        "lowest_m": judged.lowest,
     });
     if let (Some(failure), Value::Object(map)) = (&judged.failure, &mut scene) {
         map.insert("failure".into(), value(failure));

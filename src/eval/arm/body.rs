@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Vector3};
 use super::super::rng::Rng;
 use crate::geom::{Aabb, Pose2};
 use crate::math::gjk;
-use crate::robot::{Convex, MovingJoint, RobotModel};
+use crate::robot::{Convex, MovingJoint, RobotModel, Shape};
 
 /// Links that move against each other are apart by this, m.
 const OWN_LINKS: f64 = 0.005;
@@ -45,11 +45,6 @@ impl<'a> Body<'a> {
         self.rigid.max[2].max(0.0)
     }
 
-    /// Height of their lowest point, m; infinite where there is none.
-    pub fn lowest(&self) -> f64 {
-        self.rigid.min[2]
-    }
-
     /// Joint values, each uniform over its range (endless: one turn), but for a little at the ends.
     pub fn posture(&self, rng: &mut Rng) -> Vec<f64> {
         let turn = std::f64::consts::PI;
@@ -62,14 +57,16 @@ impl<'a> Body<'a> {
         self.robot.joints.iter().map(value).collect()
     }
 
-    /// Whether every shape keeps `clear` metres from the boxes and from the outside of a square room, and the links are apart.
+    /// Whether every shape keeps `clear` metres from the boxes and from the outside of a square room, those that joints move from the floor
+    /// too, and the links are apart.
     pub fn free(&self, at: Pose2, q: &[f64], boxes: &[Aabb], side: f64, clear: f64) -> bool {
         let base = at.isometry();
         let poses: Vec<Isometry3<f64>> = self.robot.shape_poses(q).iter().map(|pose| base * pose).collect();
         let shapes = || self.robot.shapes.iter().map(|shape| &shape.convex).zip(&poses);
-        let inside = |(convex, pose): (&Convex, &Isometry3<f64>)| {
-            let of = extent(convex, pose);
-            (0..2).all(|axis| of.min[axis] >= clear && of.max[axis] <= side - clear)
+        let inside = |(shape, pose): (&Shape, &Isometry3<f64>)| {
+            let of = extent(&shape.convex, pose);
+            let walls = (0..2).all(|axis| of.min[axis] >= clear && of.max[axis] <= side - clear);
+            walls && (shape.body == 0 || of.min[2] >= clear)
         };
         let off_boxes = |(convex, pose): (&Convex, &Isometry3<f64>)| {
             boxes.iter().all(|b| {
@@ -83,7 +80,7 @@ impl<'a> Body<'a> {
             })
         };
         let shape = |s: usize| (&self.robot.shapes[s].convex, &poses[s]);
-        shapes().all(inside)
+        self.robot.shapes.iter().zip(&poses).all(inside)
             && self.pairs.iter().all(|[a, b]| apart(shape(*a), shape(*b), OWN_LINKS))
             && shapes().all(off_boxes)
     }

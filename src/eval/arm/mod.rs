@@ -29,8 +29,6 @@ const CLEARANCE: f64 = 0.02;
 const FREE: f64 = 0.03;
 /// Start and goal are this far apart, m.
 const DISTANCE: [f64; 2] = [3.0, 8.0];
-/// The floor is an obstacle to robots whose rigid shapes are farther off it than this, m. Those of others touch it or nearly so.
-const OFF_FLOOR: f64 = 0.08;
 /// Tries for a pair of poses, and for a posture at each, before the room is drawn anew.
 const POSE_TRIES: usize = 200;
 const POSTURE_TRIES: usize = 30;
@@ -63,7 +61,8 @@ impl Kind {
 /// a kind depends on the robot, the seed and k alone.
 ///
 /// The base alone gets from start to goal: a disc as wide as the robot's rigid shapes and the clearance, under whatever begins above
-/// them. Whether the arm can be kept out of the way is not looked at, so a pair may still have no solution.
+/// them. Whether the arm can be kept out of the way is not looked at, so a pair may still have no solution. The floor is no obstacle of
+/// the scene (the base would be near one everywhere), but moving links are above it at start and goal.
 ///
 /// # Errors
 /// The kind of room that left no room for the robot.
@@ -88,7 +87,7 @@ fn head(robot: &RobotModel, seed: u64) -> Value {
     let side = metres(SIDE);
     json!({
         "schema": super::scenes::SCHEMA, "name": Suite::Arm.name(), "seed": seed,
-        "bounds": [[0.0, 0.0, metres(-1)], [side, side, metres(HEIGHT)]], "resolution": CELL, "clearance_m": CLEARANCE,
+        "bounds": [[0.0, 0.0, 0.0], [side, side, metres(HEIGHT)]], "resolution": CELL, "clearance_m": CLEARANCE,
         "limits": {
             "wheel": {
                 "speed_mps": rim(speed, turn), "acceleration_mps2": rim(acceleration, turn_acceleration), "jerk_mps3": 4.0,
@@ -103,10 +102,7 @@ fn head(robot: &RobotModel, seed: u64) -> Value {
 
 /// A room with start and goal; `None`: another must be drawn.
 fn scene(rng: &mut Rng, kind: Kind, body: &Body<'_>, id: &str) -> Option<Value> {
-    let mut placed = obstacles::draw(rng, kind)?;
-    if body.lowest() > OFF_FLOOR {
-        placed.push(CellBox { min: [0, 0, -1], max: [SIDE, SIDE, 0] });
-    }
+    let placed = obstacles::draw(rng, kind)?;
     let corners = |b: &CellBox| Aabb { min: b.min.map(metres), max: b.max.map(metres) };
     let boxes: Vec<Aabb> = placed.iter().map(corners).collect();
     let [start, goal] = poses(rng, body, &placed, &boxes)?;

@@ -21,8 +21,7 @@ impl Plan {
                 (0..SIDE).for_each(|d| [index([c, d]), index([d, c])].into_iter().for_each(|i| region[i] = 0));
             }
         }
-        // The floor is no obstacle to the base.
-        for b in boxes.iter().filter(|b| metres(b.min[2]) < height && b.max[2] > 0) {
+        for b in boxes.iter().filter(|b| metres(b.min[2]) < height) {
             let gap =
                 |axis: usize, c: i32| (metres(b.min[axis]) - middle(c)).max(middle(c) - metres(b.max[axis])).max(0.0);
             let range = |axis: usize| (b.min[axis] - wide - 1).max(0)..(b.max[axis] + wide + 1).min(SIDE);
