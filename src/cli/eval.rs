@@ -80,11 +80,10 @@ enum Which {
 
 impl ValueEnum for Which {
     fn value_variants<'a>() -> &'a [Self] {
+        use Which::{Curves, Scenes};
         const ALL: [Which; 7] = {
             let [a, b, c, d, e, f] = Suite::ALL;
-            let first = [Which::Scenes(a), Which::Scenes(b), Which::Scenes(c), Which::Scenes(d), Which::Scenes(e)];
-            let [a, b, c, d, e] = first;
-            [a, b, c, d, e, Which::Scenes(f), Which::Curves]
+            [Scenes(a), Scenes(b), Scenes(c), Scenes(d), Scenes(e), Scenes(f), Curves]
         };
         &ALL
     }

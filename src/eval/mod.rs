@@ -1,7 +1,8 @@
 //! `trajc eval`: many scenes through the whole pipeline, and the papers' tables beside.
 //!
-//! [`document`] makes the suites of \[SCR\] section VI, [`arm`] rooms for a robot with an arm, [`read()`] reads `trajc.scenes/1`, [`judge`] compiles one scene,
-//! [`tables`] prints what came out beside the paper's own rows, [`figures`] says it in JSON. [`curves`]: the paths of \[CONV\] section 3.
+//! [`document`] makes the suites of \[SCR\] section VI, [`arm`] rooms for robots with arms, [`read()`] reads `trajc.scenes/1`, [`judge`]
+//! compiles one scene, [`tables`] prints what came out beside others' rows, [`figures`] says it in JSON. [`curves`]: the paths of \[CONV\]
+//! section 3.
 
 pub mod arm;
 mod arm_table;

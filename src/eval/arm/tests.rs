@@ -14,6 +14,10 @@ fn arm7() -> RobotModel {
     robot(include_str!("../../../robots/arm7/robot.yaml"), include_str!("../../../robots/arm7/arm7.urdf"))
 }
 
+fn arm4() -> RobotModel {
+    robot(include_str!("../../../robots/arm4/robot.yaml"), include_str!("../../../robots/arm4/arm4.urdf"))
+}
+
 fn box_base() -> RobotModel {
     robot(include_str!("../../../robots/box_base/robot.yaml"), include_str!("../../../robots/box_base/box_base.urdf"))
 }
@@ -134,4 +138,13 @@ fn the_arm_of_arm7_is_as_long_as_stated_and_folds_to_within_the_base() {
     let folded = [0.0, -0.7, 0.0, 2.2, 0.0, -1.5, 0.0];
     assert_eq!(robot.touching(&robot.self_pairs(), &folded), None);
     assert!(robot.radius(&folded) <= 0.4 * (1.0 + 2e-3), "{}", robot.radius(&folded));
+}
+
+#[test]
+fn the_arm_of_arm4_folds_flat_as_its_urdf_says() {
+    let robot = arm4();
+    let folded = [0.0, -90.0, 170.0, 10.0].map(f64::to_radians);
+    assert_eq!(robot.touching(&robot.self_pairs(), &folded), None);
+    assert!(robot.radius(&folded) <= 0.19 * (1.0 + 2e-3) && robot.extents(&folded).max[2] < 0.35);
+    assert!((robot.extents(&[0.0; 4]).max[2] - 0.73).abs() < 1e-12);
 }
