@@ -13,7 +13,7 @@ const TRIES: usize = 1000;
 
 /// The obstacles of a room; `None`: too full.
 pub(super) fn draw(rng: &mut Rng, kind: Kind) -> Option<Vec<CellBox>> {
-    let makers: [(usize, fn(&mut Rng) -> Piece); 2] = match kind {
+    let makers: [(usize, Maker); 2] = match kind {
         Kind::Cuboids => [(WALLS, wall), (FLOATING, floating)],
         Kind::Tables => [(TABLES, tables), (WALLS, wall)],
     };
@@ -28,6 +28,9 @@ pub(super) fn draw(rng: &mut Rng, kind: Kind) -> Option<Vec<CellBox>> {
     }
     Some(placed)
 }
+
+/// Draws an obstacle somewhere.
+type Maker = fn(&mut Rng) -> Piece;
 
 /// An obstacle: what it is made of, and the box that others keep out of.
 struct Piece {

@@ -1,3 +1,5 @@
+use std::f64::consts::FRAC_PI_2;
+
 use super::*;
 use crate::eval::scenes::{Scene, SceneSet};
 use crate::mission::PoseSpec;
@@ -33,7 +35,7 @@ fn surface_is_clear(robot: &RobotModel, set: &SceneSet, scene: &Scene, end: &Pos
     let at = Pose2::new(value(end.x), value(end.y), value(end.yaw)).isometry();
     let q: Vec<f64> = robot.joints.iter().map(|j| end.joints[&j.name]).collect();
     let directions = (0..14).flat_map(|i| (0..14).map(move |j| (i, j))).map(|(i, j)| {
-        let (turn, tilt) = (f64::from(i) * 0.449, f64::from(j) * 0.2417 - 1.5708);
+        let (turn, tilt) = (f64::from(i) * 0.449, (f64::from(j) / 6.5 - 1.0) * FRAC_PI_2);
         nalgebra::Vector3::new(turn.cos() * tilt.cos(), turn.sin() * tilt.cos(), tilt.sin())
     });
     let directions: Vec<_> = directions.collect();
