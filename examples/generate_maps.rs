@@ -202,6 +202,35 @@ pub fn home() -> Vec<u8> {
     ply("a home of two rooms with a shelf", &points)
 }
 
+/// The kitchen's sides, cells: 5.5 x 4.5 m.
+const KITCHEN: [u32; 2] = [110, 90];
+/// The wall between the kitchen and the hall before it, 1.6 m high and 0.2 m thick, with a door of 1.05 m under a lintel at 1.20 m.
+const DOOR: [Block; 3] = [[[0, 44], [42, 46], [0, 32]], [[65, 110], [42, 46], [0, 32]], [[44, 65], [42, 46], [24, 32]]];
+/// A table, four legs and a top at 0.70 to 0.75 m, and a cupboard that hangs over its farther side: 0.35 m is left between them.
+const TABLE: [Block; 6] = [
+    [[70, 71], [70, 71], [0, 14]],
+    [[99, 100], [70, 71], [0, 14]],
+    [[70, 71], [85, 86], [0, 14]],
+    [[99, 100], [85, 86], [0, 14]],
+    [[70, 100], [70, 86], [14, 15]],
+    [[70, 100], [76, 90], [22, 30]],
+];
+
+/// `maps/kitchen.ply`: a hall and a kitchen for a robot with an arm. The floor is there to be hit: a layer of cells below z = 0, whole, for
+/// robots that keep off it.
+pub fn kitchen() -> Vec<u8> {
+    let mut points: Vec<[f64; 3]> = Vec::new();
+    points.extend((0..KITCHEN[0]).flat_map(|i| (0..KITCHEN[1]).map(move |j| [middle(i), middle(j), -0.5 * CELL])));
+    for [x, y, z] in DOOR.into_iter().chain(TABLE) {
+        for i in x[0]..x[1] {
+            for j in y[0]..y[1] {
+                points.extend((z[0]..z[1]).map(|k| [middle(i), middle(j), middle(k)]));
+            }
+        }
+    }
+    ply("a hall and a kitchen with a table and a cupboard", &points)
+}
+
 /// Points as a binary PLY file.
 fn ply(what: &str, points: &[[f64; 3]]) -> Vec<u8> {
     let mut file = format!(
@@ -215,8 +244,14 @@ fn ply(what: &str, points: &[[f64; 3]]) -> Vec<u8> {
 }
 
 /// Everything, by file name.
-pub fn all() -> [(&'static str, Vec<u8>); 4] {
-    [("arch_bridges.pcd", arch_bridges()), ("first.csv", first()), ("home.ply", home()), ("site.ply", site())]
+pub fn all() -> [(&'static str, Vec<u8>); 5] {
+    [
+        ("arch_bridges.pcd", arch_bridges()),
+        ("first.csv", first()),
+        ("home.ply", home()),
+        ("kitchen.ply", kitchen()),
+        ("site.ply", site()),
+    ]
 }
 
 #[allow(dead_code)] // not called where a test includes this file

@@ -102,6 +102,39 @@ fn a_suite_of_three_scenes_is_written_read_back_and_judged_alike() {
 }
 
 #[test]
+fn rooms_for_arms_stand_beside_topay_and_take_any_robot_as_table_one_does() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let suite = ["--suite", "arm", "--robot", ROBOT, "--count", "1", "--seed", "3"];
+    let args: Vec<&str> = suite.iter().copied().chain(["--write-scenes", "s.json"]).collect();
+    let output = eval(&args, folder.path());
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let table = text(&output.stdout);
+    for expected in ["Rooms for arms, 2 scenes", "cuboids TopAY, measured", "tables trajc, certified", "of 2 certified"]
+    {
+        assert!(table.contains(expected), "{expected} in {table}");
+    }
+    let output = eval(&["--scenes", "s.json", "--robot", ROBOT, "--json", "--write-commands", "out"], folder.path());
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let json: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let rows = json["totals"]["by_kind"].as_array().expect("a list");
+    for ((row, scene), kind) in rows.iter().zip(json["scenes"].as_array().expect("a list")).zip(["cuboids", "tables"]) {
+        assert_eq!([&row["kind"], &scene["kind"]], [kind; 2]);
+        assert_eq!(scene["id"], format!("arm-{kind}-3-000"));
+        let certified = scene["status"] == "certified";
+        assert_eq!((&row["count"], &row["certified"]), (&Value::from(1), &Value::from(i32::from(certified))));
+        assert_eq!(row["time_s"], scene["metrics"]["time_s"], "of one scene the mean is its own");
+        assert_eq!(row["failures"].as_object().map(serde_json::Map::len), Some(usize::from(!certified)));
+        let written = folder.path().join("out").join(format!("arm-{kind}-3-000")).join("commands.csv");
+        assert_eq!(written.exists(), certified);
+    }
+    assert_eq!(rows.len(), 2);
+    // The limits that the suite has for another robot's blades are no fault of this one.
+    let output = eval(&["--suite", "table1", "--robot", ROBOT, "--count", "1"], folder.path());
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("Table I, 1 scenes"));
+}
+
+#[test]
 fn a_parameterisation_is_taken_for_all_scenes() {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("s.json"), SCENES).expect("written");

@@ -14,7 +14,7 @@ use super::terminal::Terminal;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::emit::csv::{self, CsvHeader};
 use crate::eval::{self, Judged, SceneSet, Suite, figures, tables};
-use crate::mission::Parameterisation;
+use crate::mission::{LimitsSpec, Parameterisation};
 use crate::pipeline::{CompileOptions, Outcome, TextFile};
 use crate::report::schema::{InputFile, InputsPart};
 use crate::robot::{self, Files, RobotInputs, RobotModel, spec};
@@ -26,17 +26,18 @@ use crate::robot::{self, Files, RobotInputs, RobotModel, spec};
 #[derive(Debug, clap::Args)]
 #[command(group(clap::ArgGroup::new("what").required(true).args(["suite", "scenes"])))]
 pub struct EvalArgs {
-    /// Draw the scenes of this table of [SCR]; fig5 and fig6: the one scene of a figure; curves: the paths of [CONV] section 3 and
-    /// tighter ones under every time law.
+    /// Draw the scenes of this table of [SCR]; fig5 and fig6: the one scene of a figure; arm: rooms for a robot with an arm; curves: the
+    /// paths of [CONV] section 3 and tighter ones under every time law.
     #[arg(long)]
     suite: Option<Which>,
     /// Read the scenes from a file.
     #[arg(long, value_name = "FILE.json")]
     scenes: Option<PathBuf>,
-    /// Robot: a folder, a robot.yaml or a .urdf [default: scr_db for table1, box_base for table2 and table3].
+    /// Robot: a folder, a robot.yaml or a .urdf [default: scr_db for table1, box_base for table2 and table3, arm7 for
+    /// arm]. Any number of joints.
     #[arg(long, value_name = "PATH")]
     robot: Option<PathBuf>,
-    /// Scenes for each number of boxes [default: the paper's 500 or 200]; of a file: the first N [default: all].
+    /// Scenes for each number of boxes, or kind of room [default: the paper's 500, 200 or 120]; of a file: the first N [default: all].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=5000))]
     count: Option<u32>,
     /// Seed of a suite [default: 1].
@@ -79,9 +80,10 @@ enum Which {
 
 impl ValueEnum for Which {
     fn value_variants<'a>() -> &'a [Self] {
-        const ALL: [Which; 6] = {
-            let [a, b, c, d, e] = Suite::ALL;
-            [Which::Scenes(a), Which::Scenes(b), Which::Scenes(c), Which::Scenes(d), Which::Scenes(e), Which::Curves]
+        use Which::{Curves, Scenes};
+        const ALL: [Which; 7] = {
+            let [a, b, c, d, e, f] = Suite::ALL;
+            [Scenes(a), Scenes(b), Scenes(c), Scenes(d), Scenes(e), Scenes(f), Curves]
         };
         &ALL
     }
@@ -112,6 +114,9 @@ const SCR_DB: [&str; 3] =
 const BOX_BASE: [&str; 3] =
     ["box_base", include_str!("../../robots/box_base/robot.yaml"), include_str!("../../robots/box_base/box_base.urdf")];
 
+const ARM7: [&str; 3] =
+    ["arm7", include_str!("../../robots/arm7/robot.yaml"), include_str!("../../robots/arm7/arm7.urdf")];
+
 /// Runs the scenes and prints.
 ///
 /// # Errors
@@ -121,9 +126,15 @@ pub fn eval(args: &EvalArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics>
         return curves::eval(args, terminal);
     }
     let disk = Disk::default();
-    let (set, text) = scenes(args, &disk)?;
+    let (mut set, text) = scenes(args, &disk)?;
     let suite = Suite::of(&set);
-    let loaded = Loaded::read(args, &set, suite, &disk)?;
+    let files = RobotText::read(args, suite, &set.file, &disk)?;
+    if suite.is_some() {
+        // A suite's limits of joints are those of the robot that it was made for.
+        let own = files.model(&LimitsSpec::default(), &disk)?;
+        set.limits.joints.retain(|name, _| own.joints.iter().any(|j| j.name == *name));
+    }
+    let loaded = Loaded::new(files, &set, &disk)?;
     set.fits(&loaded.robot)?;
     if let Some(path) = &args.write_scenes {
         output::write_file(path, text.text.as_bytes())?;
@@ -195,7 +206,7 @@ fn scenes(args: &EvalArgs, disk: &Disk) -> Result<(SceneSet, TextFile), Diagnost
                 Some(path) => path.display().to_string(),
                 None => format!("{} --seed {}", suite.name(), args.seed.unwrap_or(1)),
             };
-            TextFile { name, text: generate(args, suite, count.unwrap_or(eval::default_count(suite)))? }
+            TextFile { name, text: generate(args, suite, count.unwrap_or(eval::default_count(suite)), disk)? }
         }
     };
     let mut set = eval::read(&text.name, &text.text)?;
@@ -205,7 +216,7 @@ fn scenes(args: &EvalArgs, disk: &Disk) -> Result<(SceneSet, TextFile), Diagnost
     Ok((set, text))
 }
 
-fn generate(args: &EvalArgs, suite: Suite, count: usize) -> Result<String, Diagnostics> {
+fn generate(args: &EvalArgs, suite: Suite, count: usize, disk: &Disk) -> Result<String, Diagnostics> {
     if suite.is_figure() && (args.seed.is_some() || args.count.is_some()) {
         let message = format!("{} is one fixed scene: there is nothing to count or to draw", suite.name());
         return Err(Diagnostic::error("eval/fixed", message).hint("leave `--count` and `--seed` out").into());
@@ -214,14 +225,63 @@ fn generate(args: &EvalArgs, suite: Suite, count: usize) -> Result<String, Diagn
         let message = format!("`--boxes` is for table3; {} has its own number", suite.name());
         return Err(Diagnostic::error("eval/boxes", message).hint("leave `--boxes` out").into());
     }
+    let seed = args.seed.unwrap_or(1);
+    if suite == Suite::Arm {
+        let robot = RobotText::read(args, Some(suite), "", disk)?.model(&LimitsSpec::default(), disk)?;
+        return eval::arm::document(&robot, count, seed).map_err(|kind| {
+            let message = format!(
+                "found no room with {} where `{}` has free poses and a way between them",
+                kind.name(),
+                robot.name
+            );
+            Diagnostic::error("eval/arm", message)
+                .hint("is the robot larger than a passage of 1 m? `trajc inspect` shows its size")
+                .into()
+        });
+    }
     let mut boxes: Vec<usize> = args.boxes.iter().map(|n| usize::from(*n)).collect();
     boxes.sort_unstable();
     boxes.dedup();
     let boxes = if boxes.is_empty() { eval::default_boxes(suite) } else { &boxes };
-    eval::document(suite, boxes, count, args.seed.unwrap_or(1)).map_err(|boxes| {
+    eval::document(suite, boxes, count, seed).map_err(|boxes| {
         let message = format!("found no room for {boxes} boxes and a way between them");
         Diagnostic::error("eval/boxes", message).hint("ask for fewer with `--boxes`").into()
     })
+}
+
+/// A robot's files.
+struct RobotText {
+    /// As the command header names it.
+    name: String,
+    files: inputs::RobotFiles,
+}
+
+impl RobotText {
+    /// The robot that was asked for, else the suite's own. `file`: where the scenes are from, for messages.
+    fn read(args: &EvalArgs, suite: Option<Suite>, file: &str, disk: &Disk) -> Result<Self, Diagnostics> {
+        let (name, files) = match (&args.robot, suite) {
+            (Some(path), _) => {
+                let path = robot_file(path)?;
+                (path.display().to_string(), inputs::read_robot_files(&path, disk, None)?)
+            }
+            (None, Some(Suite::Arm)) => built_in(&ARM7)?,
+            (None, Some(suite)) if suite.has_blades() => built_in(&SCR_DB)?,
+            (None, Some(_)) => built_in(&BOX_BASE)?,
+            (None, None) => {
+                let message = "these scenes belong to no suite by their `name`, so they need `--robot`";
+                let hint = "for example `--robot robots/scr_db`";
+                return Err(Diagnostic::error("eval/no-robot", message).file(file).hint(hint).into());
+            }
+        };
+        Ok(Self { name, files })
+    }
+
+    /// The robot with these limits over its own.
+    fn model(&self, overrides: &LimitsSpec, disk: &Disk) -> Result<RobotModel, Diagnostics> {
+        let (spec, _, urdf) = &self.files;
+        let mut files: Box<dyn Files> = Box::new(disk.clone());
+        robot::parse(RobotInputs { spec, urdf: (&urdf.name, &urdf.text), files: files.as_mut(), overrides })
+    }
 }
 
 /// The robot with the set's limits, and what it was read from.
@@ -233,29 +293,11 @@ struct Loaded {
 }
 
 impl Loaded {
-    fn read(args: &EvalArgs, set: &SceneSet, suite: Option<Suite>, disk: &Disk) -> Result<Self, Diagnostics> {
-        let (name, (spec, yaml, urdf)) = match (&args.robot, suite) {
-            (Some(path), _) => {
-                let path = robot_file(path)?;
-                (path.display().to_string(), inputs::read_robot_files(&path, disk, None)?)
-            }
-            (None, Some(suite)) if suite.has_blades() => built_in(&SCR_DB)?,
-            (None, Some(_)) => built_in(&BOX_BASE)?,
-            (None, None) => {
-                let message = "these scenes belong to no suite by their `name`, so they need `--robot`";
-                let hint = "for example `--robot robots/scr_db`";
-                return Err(Diagnostic::error("eval/no-robot", message).file(set.file.clone()).hint(hint).into());
-            }
-        };
-        let mut files: Box<dyn Files> = Box::new(disk.clone());
-        let robot = robot::parse(RobotInputs {
-            spec: &spec,
-            urdf: (&urdf.name, &urdf.text),
-            files: files.as_mut(),
-            overrides: &set.limits,
-        })?;
-        let inputs = yaml.iter().chain([&urdf]).map(|f| InputFile::new(f.name.clone(), f.text.as_bytes())).collect();
-        Ok(Self { robot, name, inputs })
+    fn new(text: RobotText, set: &SceneSet, disk: &Disk) -> Result<Self, Diagnostics> {
+        let robot = text.model(&set.limits, disk)?;
+        let (_, yaml, urdf) = &text.files;
+        let inputs = yaml.iter().chain([urdf]).map(|f| InputFile::new(f.name.clone(), f.text.as_bytes())).collect();
+        Ok(Self { robot, name: text.name, inputs })
     }
 }
 

@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 
 use super::statistics::{Summary, mean_metrics};
 use super::tables::{self, ExcessRow, Row3};
-use super::{AlphaExcess, Judged, SceneSet, Suite};
+use super::{AlphaExcess, ArmRow, Judged, SceneSet, Suite};
 use crate::report::Metrics;
 
 /// The metrics that a suite's table shows of a scene: Table I the optimised trajectory, Tables II and III the held
@@ -24,6 +24,7 @@ pub fn document(set: &SceneSet, suite: Option<Suite>, judged: &[Judged], variant
 fn scene(suite: Option<Suite>, judged: &Judged) -> Value {
     let mut scene = json!({
         "id": judged.id,
+        "kind": judged.kind,
         "status": if judged.certified { "certified" } else { "failed" },
         "search_ms": judged.ms("search"),
         "optimize_ms": judged.ms("optimize"),
@@ -44,6 +45,7 @@ fn scene(suite: Option<Suite>, judged: &Judged) -> Value {
         "driven": judged.driven,
         "bound_s": judged.bound.1,
         "turns": judged.turns,
+        "lowest_m": judged.lowest,
     });
     if let (Some(failure), Value::Object(map)) = (&judged.failure, &mut scene) {
         map.insert("failure".into(), value(failure));
@@ -97,6 +99,9 @@ fn totals(set: &SceneSet, suite: Option<Suite>, judged: &[Judged], variants: &[V
         };
         totals["alpha_excess_percent"] =
             json!({"arc_length": rows(judged), "flat_dense": rows(dense), "flat_sparse": rows(sparse)});
+    }
+    if suite == Some(Suite::Arm) {
+        totals["by_kind"] = value(&ArmRow::by_kind(judged));
     }
     if let (Some(Suite::Fig5), [sparse, dense]) = (suite, variants) {
         let scenes = |judged: &[Judged]| judged.iter().map(|j| scene(suite, j)).collect::<Vec<_>>();

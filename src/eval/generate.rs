@@ -58,8 +58,8 @@ fn recipe(suite: Suite) -> Recipe {
     let flat = Recipe { height: 8, arches: 0, free: 0.35, passage: 0.20, under: 6, distance: 2.0 };
     match suite {
         Suite::Table1 => Recipe { height: 20, arches: 6, free: 0.38, under: 8, ..flat },
-        // Figures are fixed scenes and ask for no recipe.
-        Suite::Table2 | Suite::Fig5 | Suite::Fig6 => flat,
+        // Figures are fixed scenes and ask for no recipe, nor do rooms for arms, which `arm` draws.
+        Suite::Table2 | Suite::Fig5 | Suite::Fig6 | Suite::Arm => flat,
         Suite::Table3 => Recipe { distance: 5.0, ..flat },
     }
 }
@@ -85,21 +85,23 @@ pub fn default_boxes(suite: Suite) -> &'static [usize] {
         Suite::Table1 => &[15],
         Suite::Table2 => &[20],
         Suite::Table3 => &[10, 20, 35],
-        Suite::Fig5 | Suite::Fig6 => &[],
+        Suite::Fig5 | Suite::Fig6 | Suite::Arm => &[],
     }
 }
 
-/// Scenes a suite (and number of boxes) has in the paper.
+/// Scenes a suite (and number of boxes, or kind of room) has in the paper.
 pub fn default_count(suite: Suite) -> usize {
     match suite {
         Suite::Table1 => 500,
         Suite::Table2 | Suite::Table3 => 200,
         Suite::Fig5 | Suite::Fig6 => 1,
+        Suite::Arm => 120,
     }
 }
 
 /// A suite of `count` scenes for each number of boxes, as a `trajc.scenes/1` document. Scene k depends on the seed, the
-/// suite, the boxes and k alone. Figures are one fixed scene, whatever the other arguments.
+/// suite, the boxes and k alone. Figures are one fixed scene, whatever the other arguments. [`Suite::Arm`] has no scenes here: they need a
+/// robot ([`super::arm::document`]).
 ///
 /// # Errors
 /// The number of boxes that left no room for a scene.
@@ -136,7 +138,7 @@ fn head(suite: Suite, name: &str, seed: u64, room: [i32; 3]) -> Value {
     })
 }
 
-fn written(head: &Value, scenes: &[String]) -> String {
+pub(super) fn written(head: &Value, scenes: &[String]) -> String {
     let head = head.to_string();
     let head = head.strip_suffix('}').expect("a JSON object ends in its brace");
     format!("{head},\"scenes\":[\n{}\n]}}\n", scenes.join(",\n"))
@@ -155,7 +157,7 @@ fn figure(suite: Suite, fixed: &Fixed) -> Value {
 }
 
 /// Cells in metres, correctly rounded.
-fn metres(cells: i32) -> f64 {
+pub(super) fn metres(cells: i32) -> f64 {
     f64::from(cells) / 20.0
 }
 

@@ -21,6 +21,8 @@ use crate::trajectory::{Leg, Trajectory, steered_curve::SteeredCurve};
 pub struct Judged {
     /// The scene.
     pub id: String,
+    /// What sort of room it is.
+    pub kind: Option<String>,
     /// Its boxes.
     pub boxes: usize,
     /// Proven; else [`Judged::failure`] says why not.
@@ -53,6 +55,8 @@ pub struct Judged {
     pub least_radius: f64,
     /// Moving joints, and their least and greatest position on the way.
     pub joint_ranges: Vec<(String, [f64; 2])>,
+    /// Lowest point of the shapes that joints move, at any row, m: below 0 is below the floor, which no scene has as an obstacle.
+    pub lowest: Option<f64>,
     /// Peaks of every actuator as commanded, against its limits; empty where nothing was judged.
     pub limits: Vec<LimitPart>,
     /// Proven, m.
@@ -110,6 +114,7 @@ pub fn judge(
     timings.extend(&outcome.timings);
     let judged = Judged {
         id: scene.id.clone(),
+        kind: scene.kind.clone(),
         boxes: scene.boxes.len(),
         certified: report.status == Status::Certified,
         failure: report.failure.clone(),
@@ -126,6 +131,7 @@ pub fn judge(
         turns: compiled.map(|c| Turns::of(&c.commands)),
         least_radius: least_radius(&robot.base, robot.track_width),
         joint_ranges: compiled.map(|c| joint_ranges(&c.commands)).unwrap_or_default(),
+        lowest: compiled.and_then(|c| lowest(robot, &c.commands)),
         limits: report.limits.clone(),
         clearance_proven: report.certificate.as_ref().and_then(|c| c.clearance_proven_m),
         bound: bound(set, scene, robot),
@@ -142,6 +148,16 @@ fn joint_ranges(table: &CommandTable) -> Vec<(String, [f64; 2])> {
         (name.clone(), positions.fold([f64::INFINITY, f64::NEG_INFINITY], wider))
     };
     table.joints.iter().enumerate().map(range).collect()
+}
+
+/// Lowest point of the shapes that joints move, m; `None` where there is none.
+fn lowest(robot: &RobotModel, table: &CommandTable) -> Option<f64> {
+    let mut arm = robot.clone();
+    arm.shapes.retain(|shape| shape.body != 0);
+    if arm.shapes.is_empty() {
+        return None;
+    }
+    table.rows.iter().map(|row| arm.extents(&row.joint_positions).min[2]).reduce(f64::min)
 }
 
 /// Drives and turns on the spot. A leg of heading and arc length counts as one drive, whatever turns on the spot are in it.

@@ -1,8 +1,11 @@
 //! `trajc eval`: many scenes through the whole pipeline, and the papers' tables beside.
 //!
-//! [`document`] makes the suites of \[SCR\] section VI, [`read()`] reads `trajc.scenes/1`, [`judge`] compiles one scene,
-//! [`tables`] prints what came out beside the paper's own rows, [`figures`] says it in JSON. [`curves`]: the paths of \[CONV\] section 3.
+//! [`document`] makes the suites of \[SCR\] section VI, [`arm`] rooms for robots with arms, [`read()`] reads `trajc.scenes/1`, [`judge`]
+//! compiles one scene, [`tables`] prints what came out beside others' rows, [`figures`] says it in JSON. [`curves`]: the paths of \[CONV\]
+//! section 3.
 
+pub mod arm;
+mod arm_table;
 mod bound;
 pub mod curves;
 mod excess;
@@ -24,6 +27,7 @@ pub mod tables;
 mod text_table;
 mod turns;
 
+pub use arm_table::ArmRow;
 pub use bound::travel_time;
 pub use excess::AlphaExcess;
 pub use fault::ScenesError;
@@ -38,7 +42,7 @@ pub use turns::{Turns, least_radius};
 use crate::mission::Parameterisation;
 use crate::pipeline::CompileOptions;
 
-/// The suites of \[SCR\] section VI, and the scenes of two of its figures.
+/// The suites of \[SCR\] section VI, the scenes of two of its figures, and rooms for arms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Suite {
     /// Cubes and arch bridges, 10 x 10 x 1 m: before and after optimisation.
@@ -51,11 +55,13 @@ pub enum Suite {
     Fig5,
     /// One way under two arch bridges, with the blades down and up.
     Fig6,
+    /// 20 x 20 m with walls, floating boxes and tables, for a robot with an arm: random postures at start and goal.
+    Arm,
 }
 
 impl Suite {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Table1, Self::Table2, Self::Table3, Self::Fig5, Self::Fig6];
+    pub const ALL: [Self; 6] = [Self::Table1, Self::Table2, Self::Table3, Self::Fig5, Self::Fig6, Self::Arm];
 
     /// As on the command line: `table1`, `fig5`.
     pub fn name(self) -> &'static str {
@@ -65,6 +71,7 @@ impl Suite {
             Self::Table3 => "table3",
             Self::Fig5 => "fig5",
             Self::Fig6 => "fig6",
+            Self::Arm => "arm",
         }
     }
 
@@ -85,7 +92,7 @@ impl Suite {
         match self {
             Self::Table2 => [false, true].map(|dense| CompileOptions { dense, ..flat }).to_vec(),
             Self::Fig5 => [false, true].map(|dense| CompileOptions { dense, spins: false, ..flat }).to_vec(),
-            Self::Table1 | Self::Table3 | Self::Fig6 => Vec::new(),
+            Self::Table1 | Self::Table3 | Self::Fig6 | Self::Arm => Vec::new(),
         }
     }
 

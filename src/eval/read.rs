@@ -21,7 +21,7 @@ const CLEARANCE: f64 = 0.05;
 
 const TOP: &[&str] = &["schema", "name", "seed", "bounds", "resolution", "clearance_m", "limits", "reverse", "scenes"];
 /// `passage_radius` is what a generator may note beside a scene: the widest disc that gets through.
-const SCENE: &[&str] = &["id", "boxes", "start", "goal", "passage_radius"];
+const SCENE: &[&str] = &["id", "kind", "boxes", "start", "goal", "passage_radius"];
 const BOX: &[&str] = &["min", "max"];
 const POSE: &[&str] = &["x", "y", "yaw", "joints"];
 
@@ -264,7 +264,12 @@ impl Reader {
         if let Some(radius) = get(entries, "passage_radius") {
             self.number(radius, &join(path, "passage_radius"), 0.0, LARGE);
         }
-        Some(Scene { id: id?, boxes: boxes?, start: start?, goal: goal? })
+        let kind = match get(entries, "kind") {
+            None => Some(None),
+            Some(Json::Text(kind)) => Some(Some(shortened(kind))),
+            Some(other) => self.kind(&join(path, "kind"), "text", other),
+        };
+        Some(Scene { id: id?, kind: kind?, boxes: boxes?, start: start?, goal: goal? })
     }
 
     fn id(&mut self, value: &Json, path: &str) -> Option<String> {

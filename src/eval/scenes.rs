@@ -40,6 +40,8 @@ pub struct SceneSet {
 pub struct Scene {
     /// Its name.
     pub id: String,
+    /// What sort of room it is, where the set has several; rows of tables go by it.
+    pub kind: Option<String>,
     /// Obstacles.
     pub boxes: Vec<Aabb>,
     /// With x, y and yaw.

@@ -11,6 +11,8 @@ pub struct Summary {
     pub mean: f64,
     /// 50th percentile.
     pub median: f64,
+    /// 90th percentile.
+    pub p90: f64,
     /// 99th percentile.
     pub p99: f64,
     /// Greatest.
@@ -30,7 +32,7 @@ impl Summary {
                 sorted[below] + rest * (sorted[(below + 1).min(n - 1)] - sorted[below])
             }
         };
-        Self { mean: mean(sorted.iter().copied()), median: at(0.5), p99: at(0.99), max: at(1.0) }
+        Self { mean: mean(sorted.iter().copied()), median: at(0.5), p90: at(0.9), p99: at(0.99), max: at(1.0) }
     }
 }
 
@@ -61,7 +63,7 @@ mod tests {
     #[test]
     fn percentiles_lie_between_their_neighbours() {
         let s = Summary::of((0..=100).rev().map(f64::from));
-        assert_eq!((s.mean, s.median, s.p99, s.max), (50.0, 50.0, 99.0, 100.0));
+        assert_eq!((s.mean, s.median, s.p90, s.p99, s.max), (50.0, 50.0, 90.0, 99.0, 100.0));
         assert_eq!(Summary::of([1.0, 2.0]).median, 1.5);
         assert_eq!(Summary::of([7.0]).p99, 7.0);
         assert!(Summary::of([]).median.is_nan());

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::statistics::{Summary, mean, mean_metrics};
 use super::text_table::{TextTable, fixed};
 use super::{AlphaExcess, Judged, Suite};
-use super::{figure_tables, paper};
+use super::{arm_table, figure_tables, paper};
 use crate::report::Metrics;
 
 /// More different numbers of boxes than this are one row of Table III.
@@ -19,11 +19,12 @@ pub fn render(suite: Option<Suite>, judged: &[Judged], variants: &[Vec<Judged>])
         Some(Suite::Table2) => table2(judged, variants),
         Some(Suite::Fig5) => figure_tables::fig5(judged, variants),
         Some(Suite::Fig6) => figure_tables::fig6(judged),
+        Some(Suite::Arm) => arm_table::render(judged),
         Some(Suite::Table3) | None => table3(judged, suite.is_some()),
     }
 }
 
-fn certified(judged: &[Judged]) -> impl Iterator<Item = &Judged> {
+pub(super) fn certified(judged: &[Judged]) -> impl Iterator<Item = &Judged> {
     judged.iter().filter(|j| j.certified)
 }
 
@@ -40,7 +41,7 @@ fn means(metrics: impl Iterator<Item = Metrics>) -> [f64; 6] {
     ]
 }
 
-fn computation(judged: &[Judged]) -> Summary {
+pub(super) fn computation(judged: &[Judged]) -> Summary {
     Summary::of(judged.iter().filter_map(Judged::computation_ms))
 }
 

@@ -5,7 +5,7 @@ use super::*;
 const GOOD: &str = r#"{"schema": "trajc.scenes/1", "name": "mine", "seed": 1,
   "bounds": [[0, 0, 0], [4, 3, 1]], "resolution": 0.05, "clearance_m": 0.03, "reverse": true,
   "limits": {"wheel": {"speed_mps": 1.0}, "base": {"eta": 0.4}, "joints": {"blade": {"jerk": 15}}},
-  "scenes": [{"id": "a", "boxes": [{"min": [1, 1, 0], "max": [1.6, 1.6, 0.4]}],
+  "scenes": [{"id": "a", "kind": "hall", "boxes": [{"min": [1, 1, 0], "max": [1.6, 1.6, 0.4]}],
     "start": {"x": 0.5, "y": 0.5, "yaw": 0}, "goal": {"x": 3, "y": 2, "yaw": 1.5, "joints": {"blade": 0.25}}}]}"#;
 
 #[test]
@@ -16,6 +16,7 @@ fn a_good_file_says_what_it_says() {
     assert_eq!((set.limits.wheel.speed, set.limits.base.eta), (Some(1.0), Some(0.4)));
     assert_eq!(set.limits.joints["blade"].jerk, Some(15.0));
     let scene = &set.scenes[0];
+    assert_eq!(scene.kind.as_deref(), Some("hall"));
     assert_eq!(scene.boxes, [Aabb { min: [1.0, 1.0, 0.0], max: [1.6, 1.6, 0.4] }]);
     assert_eq!((scene.start.x, scene.goal.yaw, scene.goal.joints["blade"]), (Some(0.5), Some(1.5), 0.25));
     assert!(scene.start.joints.is_empty());
@@ -29,6 +30,7 @@ fn what_is_left_out_has_the_defaults_of_a_mission() {
         [{"id": "a", "boxes": [], "start": {"x":1,"y":1,"yaw":0}, "goal": {"x":1,"y":1,"yaw":0}, "passage_radius": 1}]}"#;
     let set = read("s.json", text).expect("good");
     assert_eq!((set.clearance, set.reverse, set.limits.clone()), (0.05, false, LimitsSpec::default()));
+    assert_eq!(set.scenes[0].kind, None);
     let mission = set.mission(&set.scenes[0]);
     assert_eq!((mission.sampling_time, mission.clearance), (0.1, 0.05));
 }
@@ -56,6 +58,7 @@ fn every_fault_is_named_with_its_place() {
         ("\"x\": 0.5", "\"x\": \"0.5\"", "`scenes[0].start.x` must be a number"),
         ("\"id\": \"a\"", "\"id\": \"../a\"", "`scenes[0].id`: \"../a\" cannot be"),
         ("\"id\": \"a\"", "\"id\": 7", "`scenes[0].id` must be text, found 7"),
+        ("\"kind\": \"hall\"", "\"kind\": [1]", "`scenes[0].kind` must be text, found a list of 1"),
         ("{\"blade\": 0.25}", "[0.25]", "`scenes[0].goal.joints` must be"),
     ];
     for (from, to, expected) in table {

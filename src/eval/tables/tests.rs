@@ -7,6 +7,7 @@ fn scene(id: &str, boxes: usize, time: f64, alpha: f64) -> Judged {
     let excess = Some(AlphaExcess { peak: alpha, share: 0.1 });
     Judged {
         id: id.into(),
+        kind: None,
         boxes,
         certified: true,
         failure: None,
@@ -23,6 +24,7 @@ fn scene(id: &str, boxes: usize, time: f64, alpha: f64) -> Judged {
         turns: None,
         least_radius: 4e-3,
         joint_ranges: vec![],
+        lowest: None,
         limits: vec![],
         clearance_proven: Some(0.03),
         bound: (4.0, 5.0),
@@ -124,4 +126,34 @@ fn fig_six_has_each_actuator_against_its_limits() {
     let row = text.lines().find(|l| l.trim().starts_with("blade")).expect("a row");
     let cells: Vec<&str> = row.split_whitespace().collect();
     assert_eq!(cells, ["blade", "0.250", "2.125", "0.750", "1.500", "0.750", "1.500", "0.750", "1.500"]);
+}
+
+#[test]
+fn rooms_for_arms_have_a_row_a_kind_beside_topay_and_failures_by_their_code() {
+    let of = |id: &str, kind: &str, time: f64, lowest: f64| Judged {
+        kind: Some(kind.into()),
+        lowest: Some(lowest),
+        ..scene(id, 160, time, 1.0)
+    };
+    let mut failed = of("c", "cuboids", 9.0, -1.0);
+    let failure = crate::report::schema::Failure {
+        stage: "search".into(),
+        reason: "none".into(),
+        code: "search/no-way".into(),
+        numbers: Default::default(),
+    };
+    (failed.certified, failed.failure) = (false, Some(failure));
+    let judged = [of("a", "cuboids", 10.0, 0.1), of("b", "cuboids", 12.0, -0.25), failed, of("d", "tables", 8.0, 0.2)];
+    let text = render(Some(Suite::Arm), &judged, &[]);
+    let line =
+        |start: &str| text.lines().find(|l| l.trim_start().starts_with(start)).unwrap_or_else(|| panic!("{text}"));
+    assert!(line("cuboids TopAY, measured").contains(" 309 ") && line("tables TopAY, measured").contains(" 12.2 "));
+    assert!(
+        line("cuboids trajc, certified 2/3").contains(" 66.7 ") && line("cuboids trajc").contains(" 11.0 "),
+        "{text}"
+    );
+    assert!(line("tables trajc, certified 1/1").contains(" 8.0 "));
+    assert!(text.contains("cuboids: 1 failed with search/no-way\n"));
+    assert!(text.contains("cuboids: 1 of the certified reaches below the floor, the lowest 0.25 m"), "{text}");
+    assert!(!text.contains("tables: 1 of"));
 }
