@@ -156,7 +156,7 @@ fn the_gradient_where_own_links_are_near_each_other_matches_finite_differences()
     assert!(near > 20, "{near}");
     // Distances are found to 0.1 um, so the way between nearest points to some thousandths. Only joints feel it.
     let block = first.layout.block();
-    let joint = |i: usize| i % block >= 6 && i % block < 18 && i % 3 == 0;
+    let joint = |i: usize| i % block >= 6 && i % block < 18 && i.is_multiple_of(3);
     assert_gradient(&mut problem, &first, &x, &multipliers, &mut at, [1e-4, 1e-2], joint);
 }
 
