@@ -1,13 +1,15 @@
 //! Speed of `optimize`: one MINCO solve with its gradient, and a whole path of about 10 m with four corners between boxes, in both
-//! parameterisations.
+//! parameterisations; and the same driven by a robot with an arm of seven joints that folds on the way.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3};
 use trajc::geom::Pose2;
 use trajc::mission::Parameterisation;
 use trajc::optimize::minco::Minco;
 use trajc::optimize::{DistanceField, OptimizeOptions, optimize_in};
-use trajc::robot::{BaseLimits, Body, Convex, MotionLimits, RobotModel, Shape};
+use trajc::robot::{
+    BaseLimits, Body, BodyMotion, Convex, IgnoreReason, IgnoredPair, MotionLimits, MovingJoint, RobotModel, Shape,
+};
 use trajc::search::{SearchMove, SearchPath, SearchState};
 
 /// Distance to boxes `[x, y, half side]`, 0.4 m high; as slow as a look-up in a grid would be fast.
@@ -62,6 +64,25 @@ fn robot() -> RobotModel {
         },
         ignore_pairs: Vec::new(),
     }
+}
+
+/// [`robot`] with an arm of seven links, which turn about z and y by turns.
+fn armed() -> RobotModel {
+    let mut armed = robot();
+    for joint in 0..7 {
+        let limits = MotionLimits { speed: Some(2.0), acceleration: Some(6.0), jerk: Some(25.0) };
+        let name = format!("link{joint}");
+        let links = [armed.bodies[joint].link.clone(), name.clone()];
+        armed.ignore_pairs.push(IgnoredPair { links, reason: IgnoreReason::Joined });
+        armed.joints.push(MovingJoint { name: name.clone(), prismatic: false, lower: -2.6, upper: 2.6, limits });
+        let axis = if joint % 2 == 0 { Vector3::z_axis() } else { Vector3::y_axis() };
+        let origin = Isometry3::translation(0.0, 0.0, if joint == 0 { 0.3 } else { 0.16 });
+        let motion = BodyMotion { joint, multiplier: 1.0, offset: 0.0, axis, prismatic: false };
+        armed.bodies.push(Body { link: name.clone(), parent: joint, origin, motion: Some(motion) });
+        let convex = Convex::Cylinder { radius: 0.04, half_length: 0.06 };
+        armed.shapes.push(Shape { link: name, body: joint + 1, pose: Isometry3::translation(0.0, 0.0, 0.08), convex });
+    }
+    armed
 }
 
 fn path(steps: &[(f64, f64)]) -> SearchPath {
@@ -127,6 +148,14 @@ fn benches(criterion: &mut Criterion) {
         let name = format!("optimize: 10 m, four corners between boxes, {}", parameterisation.key());
         criterion.bench_function(&name, |b| b.iter(|| optimize_in(&path, &field, &robot, &options)));
     }
+    let (armed, mut path) = (armed(), path);
+    for (k, state) in path.states.iter_mut().enumerate() {
+        let fold = (k as f64 / 5.0).min(1.0);
+        state.joints = [0.9, 0.3, -0.6, 0.9, 0.5, 0.7, -0.8].map(|q| q * fold).to_vec();
+    }
+    criterion.bench_function("optimize: the same with an arm of seven joints", |b| {
+        b.iter(|| optimize_in(&path, &field, &armed, &OptimizeOptions::default()));
+    });
 }
 
 criterion_group!(optimize, benches);

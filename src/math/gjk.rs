@@ -33,55 +33,94 @@ pub fn with_direction(
     toward: Vector3<f64>,
     enough: impl Fn(Gap) -> bool,
 ) -> (Gap, Vector3<f64>) {
+    let (gap, nearest, _) = iterate(|d| [support(d), Vector3::zeros()], toward, enough);
+    (gap, nearest)
+}
+
+/// The nearest points of two bodies: the gap, a point of A, and the way from B's point to it. `support(d)` gives the difference's
+/// farthest point in a direction and A's share in it. Where the bodies meet, the points mean nothing.
+pub fn with_points(
+    support: impl Fn(&Vector3<f64>) -> [Vector3<f64>; 2],
+    toward: Vector3<f64>,
+    enough: impl Fn(Gap) -> bool,
+) -> (Gap, Vector3<f64>, Vector3<f64>) {
+    let (gap, nearest, simplex) = iterate(support, toward, enough);
+    (gap, simplex.first(&nearest), nearest)
+}
+
+fn iterate(
+    support: impl Fn(&Vector3<f64>) -> [Vector3<f64>; 2],
+    toward: Vector3<f64>,
+    enough: impl Fn(Gap) -> bool,
+) -> (Gap, Vector3<f64>, Simplex) {
     let mut simplex = Simplex::new(support(&-toward));
     let mut nearest = simplex.points[0];
     let mut lower = 0.0f64;
     for _ in 0..ITERATIONS {
         let upper = nearest.norm();
         if upper < 1e-12 {
-            return (Gap { lower: 0.0, upper: 0.0 }, nearest);
+            return (Gap { lower: 0.0, upper: 0.0 }, nearest, simplex);
         }
         let next = support(&-nearest);
-        lower = lower.max(nearest.dot(&next) / upper);
+        lower = lower.max(nearest.dot(&next[0]) / upper);
         let gap = Gap { lower, upper };
-        if enough(gap) || simplex.has(&next) {
-            return (gap, nearest);
+        if enough(gap) || simplex.has(&next[0]) {
+            return (gap, nearest, simplex);
         }
         simplex.add(next);
         match simplex.reduce() {
             Some(point) => nearest = point,
-            None => return (Gap { lower: 0.0, upper: 0.0 }, nearest),
+            None => return (Gap { lower: 0.0, upper: 0.0 }, nearest, simplex),
         }
     }
-    (Gap { lower, upper: nearest.norm() }, nearest)
+    (Gap { lower, upper: nearest.norm() }, nearest, simplex)
 }
 
 /// One to four points; after `reduce` those whose hull holds the nearest point to the origin.
 struct Simplex {
     points: [Vector3<f64>; 4],
+    /// The first body's share in each.
+    firsts: [Vector3<f64>; 4],
     count: usize,
 }
 
 impl Simplex {
-    fn new(point: Vector3<f64>) -> Self {
-        Self { points: [point; 4], count: 1 }
+    fn new([point, first]: [Vector3<f64>; 2]) -> Self {
+        Self { points: [point; 4], firsts: [first; 4], count: 1 }
     }
 
     fn has(&self, p: &Vector3<f64>) -> bool {
         self.points[..self.count].iter().any(|q| (q - p).norm_squared() < 1e-24)
     }
 
-    fn add(&mut self, p: Vector3<f64>) {
-        self.points[self.count.min(3)] = p;
+    fn add(&mut self, [point, first]: [Vector3<f64>; 2]) {
+        self.points[self.count.min(3)] = point;
+        self.firsts[self.count.min(3)] = first;
         self.count = (self.count + 1).min(4);
     }
 
     fn keep(&mut self, indices: &[usize]) {
-        let old = self.points;
+        let (points, firsts) = (self.points, self.firsts);
         for (to, from) in indices.iter().enumerate() {
-            self.points[to] = old[*from];
+            self.points[to] = points[*from];
+            self.firsts[to] = firsts[*from];
         }
         self.count = indices.len();
+    }
+
+    /// The first body's share in the nearest point, which lies on the hull of the points.
+    fn first(&self, nearest: &Vector3<f64>) -> Vector3<f64> {
+        let [a, b, c] = [0, 1, 2].map(|k| self.points[k] - nearest);
+        let normal = (b - a).cross(&(c - a));
+        let area = normal.norm_squared();
+        if self.count > 2 && area > 1e-28 * (b - a).norm_squared().max((c - a).norm_squared()) {
+            let weights = [b.cross(&c), c.cross(&a), a.cross(&b)].map(|part| part.dot(&normal) / area);
+            return (0..3).map(|k| self.firsts[k] * weights[k]).sum();
+        }
+        let edge = b - a;
+        let length = edge.norm_squared();
+        let share = if self.count > 1 && length > 0.0 { (-a.dot(&edge) / length).clamp(0.0, 1.0) } else { 0.0 };
+        self.firsts[0] + (self.firsts[1] - self.firsts[0]) * share
     }
 
     /// The nearest point of the hull to the origin, dropping points that do not hold it; `None`: the origin is inside.
@@ -260,6 +299,30 @@ mod tests {
             let early = between(&shape, &a, &other, &b, Some(t));
             prop_assert!(early.lower <= full.upper + 1e-9 && early.upper >= full.lower - 1e-9);
             prop_assert!(early.lower >= t || early.upper < t || early.upper - early.lower <= 1e-9 || full.upper - full.lower > 1e-9);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn nearest_points_are_points_of_both_bodies_that_far_apart(
+            half in prop::array::uniform3(0.01f64..0.5), radius in 0.01f64..0.4, pose_a in pose(), pose_b in pose(),
+        ) {
+            let (a, b) = (Convex::Box { half }, Convex::Cylinder { radius, half_length: 0.2 });
+            let world = |shape: &Convex, pose: &Isometry3<f64>, d: &Vector3<f64>| {
+                pose.translation.vector + pose.rotation * shape.support(&pose.rotation.inverse_transform_vector(d))
+            };
+            let support = |d: &Vector3<f64>| {
+                let first = world(&a, &pose_a, d);
+                [first - world(&b, &pose_b, &-d), first]
+            };
+            let toward = pose_a.translation.vector - pose_b.translation.vector;
+            let (gap, first, apart) = with_points(support, toward, |gap| gap.upper - gap.lower <= 1e-9);
+            prop_assume!(gap.lower > 0.0);
+            let inside = |pose: &Isometry3<f64>, p: Vector3<f64>| pose.inverse_transform_point(&p.into());
+            let (on_a, on_b) = (inside(&pose_a, first), inside(&pose_b, first - apart));
+            prop_assert!((0..3).all(|k| on_a[k].abs() <= half[k] + 1e-7));
+            prop_assert!(on_b.x.hypot(on_b.y) <= radius + 1e-7 && on_b.z.abs() <= 0.2 + 1e-7);
+            prop_assert!((apart.norm() - gap.upper).abs() < 1e-9);
         }
     }
 

@@ -72,10 +72,17 @@ pub struct Reach {
 impl Reach {
     /// From the chain of bodies: no point is further from a joint than all links between them laid end to end.
     pub fn of(robot: &RobotModel, shape: &ShapeContour) -> Self {
-        let mut radius = shape.patches.first().map_or(0.0, |p| p.centre.coords.norm() + p.radius);
+        let radius = shape.patches.first().map_or(0.0, |p| p.centre.coords.norm() + p.radius);
+        let mut reach = Self::within(robot, shape.body, 0, radius);
+        reach.radius += robot.bodies[0].origin.translation.vector.norm();
+        reach
+    }
+
+    /// The same against the frame of a body further down the chain, of what is within `radius` (m) of its own body's origin.
+    pub(crate) fn within(robot: &RobotModel, body: usize, base: usize, mut radius: f64) -> Self {
         let mut joints = vec![0.0; robot.joints.len()];
-        let mut at = shape.body;
-        while at != 0 {
+        let mut at = body;
+        while at != base {
             let body = &robot.bodies[at];
             if let Some(motion) = &body.motion {
                 let joint = &robot.joints[motion.joint];
@@ -89,7 +96,6 @@ impl Reach {
             radius += body.origin.translation.vector.norm();
             at = body.parent;
         }
-        radius += robot.bodies[0].origin.translation.vector.norm();
         Self { radius, joints }
     }
 }

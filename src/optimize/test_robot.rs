@@ -3,7 +3,9 @@
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use super::penalty::clearance::DistanceField;
-use crate::robot::{BaseLimits, Body, BodyMotion, Convex, MotionLimits, MovingJoint, RobotModel, Shape};
+use crate::robot::{
+    BaseLimits, Body, BodyMotion, Convex, IgnoreReason, IgnoredPair, MotionLimits, MovingJoint, RobotModel, Shape,
+};
 
 /// Balls: centre and radius. Distance to the nearest, its kinks rounded off by a log-sum: smooth and 1-Lipschitz.
 pub struct Balls(pub Vec<([f64; 3], f64)>);
@@ -82,7 +84,7 @@ impl DistanceField for Boxes {
 }
 
 /// Like scr_db: a base box, two wheels, and for joint 0 two blades (one a mimic) on tilted axes at its top; joint 1 is a
-/// mast that slides up, with a ball on it.
+/// mast that slides up, with a ball on it. Its links are not checked against each other.
 pub fn robot(joints: usize) -> RobotModel {
     let mut bodies = vec![Body { link: "base_link".into(), parent: 0, origin: Isometry3::identity(), motion: None }];
     let place = |x: f64, y: f64, z: f64| Isometry3::translation(x, y, z);
@@ -173,6 +175,44 @@ pub fn robot(joints: usize) -> RobotModel {
             eta: 0.4,
             min_speed: 0.01,
         },
-        ignore_pairs: Vec::new(),
+        ignore_pairs: ignored(&[
+            ["base_link", "blade"],
+            ["wheel", "blade"],
+            ["base_link", "mast"],
+            ["wheel", "mast"],
+            ["blade", "mast"],
+        ]),
     }
+}
+
+fn ignored(pairs: &[[&str; 2]]) -> Vec<IgnoredPair> {
+    let of = |links: &[&str; 2]| IgnoredPair { links: links.map(str::to_string), reason: IgnoreReason::Joined };
+    pairs.iter().map(of).collect()
+}
+
+/// A round base with an arm of so many links, which turn about z and y by turns: rods, beams and balls. All but neighbours must keep
+/// apart.
+pub fn arm(joints: usize) -> RobotModel {
+    let mut arm = robot(0);
+    let convex = Convex::Cylinder { radius: 0.3, half_length: 0.1 };
+    arm.shapes =
+        vec![Shape { link: "base_link".into(), body: 0, pose: Isometry3::translation(0.0, 0.0, 0.15), convex }];
+    arm.ignore_pairs = ignored(&[["base_link", "link0"]]);
+    for joint in 0..joints {
+        let limits = MotionLimits { speed: Some(1.0), acceleration: Some(2.0), jerk: Some(10.0) };
+        let name = format!("link{joint}");
+        arm.joints.push(MovingJoint { name: name.clone(), prismatic: false, lower: -2.6, upper: 2.6, limits });
+        let axis = if joint % 2 == 0 { Vector3::z_axis() } else { Vector3::y_axis() };
+        let origin = Isometry3::translation(0.0, 0.0, if joint == 0 { 0.3 } else { 0.2 });
+        let motion = BodyMotion { joint, multiplier: 1.0, offset: 0.0, axis, prismatic: false };
+        arm.bodies.push(Body { link: name.clone(), parent: joint, origin, motion: Some(motion) });
+        let convex = match joint % 3 {
+            0 => Convex::Cylinder { radius: 0.04, half_length: 0.09 },
+            1 => Convex::Box { half: [0.04, 0.03, 0.09] },
+            _ => Convex::Sphere { radius: 0.06 },
+        };
+        arm.shapes.push(Shape { link: name, body: joint + 1, pose: Isometry3::translation(0.0, 0.0, 0.1), convex });
+        arm.ignore_pairs.extend(ignored(&[[&format!("link{joint}"), &format!("link{}", joint + 1)]]));
+    }
+    arm
 }

@@ -6,6 +6,7 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use super::Judge;
+use super::own_links::{self, Meeting, OwnLinks};
 use crate::esdf::least_of_points;
 use crate::optimize::contour::{Contour, Reach};
 use crate::robot::RobotModel;
@@ -51,10 +52,10 @@ fn look_up(field: &impl DistanceField, at: Vector3<f64>, rise: f64) -> (f64, [f6
 const INTERPOLATION_SLACK: f64 = 1.13;
 
 #[derive(Debug, Clone, Copy)]
-struct BodyFrame {
-    rotation: Matrix3<f64>,
+pub(super) struct BodyFrame {
+    pub rotation: Matrix3<f64>,
     /// Relative to the base's origin, map axes.
-    origin: Vector3<f64>,
+    pub origin: Vector3<f64>,
 }
 
 /// What pushes on a body.
@@ -93,7 +94,8 @@ pub struct ClearancePenalty {
     contour: Contour,
     /// How fast each shape's points move.
     reaches: Vec<Reach>,
-    /// Per sample: x, y, cos, sin, joints; then per shape how far it may move, m.
+    own: OwnLinks,
+    /// Per sample: x, y, cos, sin, joints; then per shape how far it may move, and per pair of own links how much nearer they may come, m.
     memory: Vec<f64>,
     joints: usize,
     clearance: f64,
@@ -118,14 +120,16 @@ pub struct ByPose {
     pub heading: f64,
 }
 
-/// A contour point and the body that it is on.
+/// What is near something.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct PointOf {
-    pub body: usize,
-    pub point: usize,
+pub(crate) enum PointOf {
+    /// A contour point, near an obstacle, and the body that it is on.
+    Contour { body: usize, point: usize },
+    /// A pair of the robot's own links.
+    Pair(usize),
 }
 
-/// A contour point near an obstacle.
+/// A contour point near an obstacle, or two links near each other.
 pub(crate) struct Touch<'a> {
     pub of: PointOf,
     /// By how much it misses the wanted clearance, m.
@@ -137,18 +141,15 @@ pub(crate) struct Touch<'a> {
     pub by_joints: &'a [f64],
 }
 
-/// What moves a point whose missing clearance grows along `push`.
-fn pushed<'a>(
+/// Adds what the joints below a body do to a push on a point of it.
+fn feel(
     robot: &RobotModel,
     frames: &[BodyFrame],
-    of: PointOf,
+    mut link: usize,
     arm: Vector3<f64>,
-    [short, weight]: [f64; 2],
     push: Vector3<f64>,
-    by_joints: &'a mut [f64],
-) -> Touch<'a> {
-    by_joints.fill(0.0);
-    let mut link = of.body;
+    by_joints: &mut [f64],
+) {
     while link != 0 {
         let (frame, body) = (&frames[link], &robot.bodies[link]);
         if let Some(motion) = &body.motion {
@@ -158,8 +159,44 @@ fn pushed<'a>(
         }
         link = body.parent;
     }
-    let by_pose = ByPose { position: [push.x, push.y], heading: arm.x * push.y - arm.y * push.x };
-    Touch { of, short, weight, by_pose, by_joints }
+}
+
+/// A point whose missing clearance grows along `push`.
+struct Pushed {
+    of: PointOf,
+    body: usize,
+    /// From the base's origin, map axes, m.
+    arm: Vector3<f64>,
+    short: f64,
+    weight: f64,
+    push: Vector3<f64>,
+}
+
+impl Pushed {
+    fn touch<'a>(self, robot: &RobotModel, frames: &[BodyFrame], by_joints: &'a mut [f64]) -> Touch<'a> {
+        let Self { of, body, arm, short, weight, push } = self;
+        by_joints.fill(0.0);
+        feel(robot, frames, body, arm, push, by_joints);
+        let by_pose = ByPose { position: [push.x, push.y], heading: arm.x * push.y - arm.y * push.x };
+        Touch { of, short, weight, by_pose, by_joints }
+    }
+}
+
+/// A pair of own links; the base moves both alike.
+fn met<'a>(
+    robot: &RobotModel,
+    frames: &[BodyFrame],
+    pair: usize,
+    meeting: &Meeting,
+    by_joints: &'a mut [f64],
+) -> Touch<'a> {
+    by_joints.fill(0.0);
+    let pushes = [-meeting.normal, meeting.normal];
+    for ((body, arm), push) in meeting.bodies.into_iter().zip(meeting.arms).zip(pushes) {
+        feel(robot, frames, body, arm, push, by_joints);
+    }
+    let (short, weight) = (own_links::MARGIN - meeting.distance, own_links::WEIGHT);
+    Touch { of: PointOf::Pair(pair), short, weight, by_pose: ByPose::default(), by_joints }
 }
 
 impl ClearancePenalty {
@@ -169,6 +206,7 @@ impl ClearancePenalty {
         let frame = BodyFrame { rotation: Matrix3::identity(), origin: Vector3::zeros() };
         Self {
             reaches: contour.shapes.iter().map(|shape| Reach::of(robot, shape)).collect(),
+            own: OwnLinks::new(robot),
             memory: Vec::new(),
             joints: robot.joints.len(),
             contour,
@@ -195,7 +233,7 @@ impl ClearancePenalty {
     }
 
     fn stride(&self) -> usize {
-        4 + self.joints + self.reaches.len()
+        4 + self.joints + self.reaches.len() + self.own.pairs.len()
     }
 
     fn place(&mut self, robot: &RobotModel, heading: [f64; 2], q: &[f64]) {
@@ -231,6 +269,12 @@ impl ClearancePenalty {
             // Not `<`: NaN is looked at.
             near |= free.is_nan() || *free <= 0.0;
         }
+        for (free, pair) in free[self.reaches.len()..].iter_mut().zip(&self.own.pairs) {
+            for ((lever, to), from) in pair.levers.iter().zip(at.joints).zip(&pose[4..]) {
+                *free -= lever * (to - from).abs();
+            }
+            near |= free.is_nan() || *free <= 0.0;
+        }
         pose[..2].copy_from_slice(&at.position);
         pose[2..4].copy_from_slice(&at.heading);
         pose[4..].copy_from_slice(at.joints);
@@ -256,7 +300,7 @@ impl ClearancePenalty {
         self.loads.fill(Load::none());
         let (scale, mut sum, mut touched) = (self.scale, 0.0, false);
         let mut loads = std::mem::take(&mut self.loads);
-        self.scan(field, at.position, sample, |PointOf { body, .. }, arm, [short, weight], gradient| {
+        self.scan(field, at.position, sample, |(body, _), arm, [short, weight], gradient| {
             let (cost, slope) = judge.weigh(short / scale);
             sum += weight * cost;
             if slope != 0.0 {
@@ -266,6 +310,20 @@ impl ClearancePenalty {
                 touched = true;
             }
         });
+        let frames = std::mem::take(&mut self.frames);
+        self.scan_own(robot, &frames, sample, |_, meeting| {
+            let (cost, slope) = judge.weigh((own_links::MARGIN - meeting.distance) / scale);
+            sum += own_links::WEIGHT * cost;
+            if slope != 0.0 {
+                let push = meeting.normal * (own_links::WEIGHT * slope / scale);
+                for ((body, arm), push) in meeting.bodies.into_iter().zip(meeting.arms).zip([-push, push]) {
+                    loads[body].force += push;
+                    loads[body].torque += arm.cross(&push);
+                }
+                touched = true;
+            }
+        });
+        self.frames = frames;
         self.loads = loads;
         if touched {
             self.gather(robot, by_pose, by_joints);
@@ -289,9 +347,16 @@ impl ClearancePenalty {
         self.place(robot, at.heading, at.joints);
         let mut by_joints = std::mem::take(&mut self.by_joints);
         let frames = std::mem::take(&mut self.frames);
-        self.scan_in(&frames, field, at.position, sample, |point, arm, [short, weight], gradient| {
+        self.scan_in(&frames, field, at.position, sample, |(body, point), arm, [short, weight], gradient| {
             if short > 0.0 {
-                touch(pushed(robot, &frames, point, arm, [short, weight], -gradient, &mut by_joints));
+                let of = PointOf::Contour { body, point };
+                let pushed = Pushed { of, body, arm, short, weight, push: -gradient };
+                touch(pushed.touch(robot, &frames, &mut by_joints));
+            }
+        });
+        self.scan_own(robot, &frames, sample, |pair, meeting| {
+            if meeting.distance < own_links::MARGIN {
+                touch(met(robot, &frames, pair, meeting, &mut by_joints));
             }
         });
         self.frames = frames;
@@ -311,19 +376,22 @@ impl ClearancePenalty {
         let mut by_joints = std::mem::take(&mut self.by_joints);
         let base = Vector3::new(at.position[0], at.position[1], 0.0);
         for of in points {
-            let (frame, point) = (&self.frames[of.body], &self.contour.points[of.point]);
-            let arm = frame.rotation * point.at.coords + frame.origin;
-            let (distance, gradient) = look_up(field, arm + base, point.rise);
-            let short = self.clearance + point.radius - distance;
-            touch(pushed(
-                robot,
-                &self.frames,
-                of,
-                arm,
-                [short, point.weight],
-                -Vector3::from(gradient),
-                &mut by_joints,
-            ));
+            match of {
+                PointOf::Contour { body, point: index } => {
+                    let (frame, point) = (&self.frames[body], &self.contour.points[index]);
+                    let arm = frame.rotation * point.at.coords + frame.origin;
+                    let (distance, gradient) = look_up(field, arm + base, point.rise);
+                    let short = self.clearance + point.radius - distance;
+                    let push = -Vector3::from(gradient);
+                    let pushed = Pushed { of, body, arm, short, weight: point.weight, push };
+                    touch(pushed.touch(robot, &self.frames, &mut by_joints));
+                }
+                PointOf::Pair(pair) => {
+                    if let Ok(meeting) = self.own.pairs[pair].meeting(robot, &self.frames, f64::INFINITY) {
+                        touch(met(robot, &self.frames, pair, &meeting, &mut by_joints));
+                    }
+                }
+            }
         }
         self.by_joints = by_joints;
     }
@@ -333,14 +401,21 @@ impl ClearancePenalty {
         field: &impl DistanceField,
         position: [f64; 2],
         sample: usize,
-        point: impl FnMut(PointOf, Vector3<f64>, [f64; 2], Vector3<f64>),
+        point: impl FnMut((usize, usize), Vector3<f64>, [f64; 2], Vector3<f64>),
     ) {
         let frames = std::mem::take(&mut self.frames);
         self.scan_in(&frames, field, position, sample, point);
         self.frames = frames;
     }
 
-    /// Looks at every point that may miss the clearance: which, where it is from the base's origin (map axes), by how much it
+    /// Looks at every pair of own links that may be too near; notes how much nearer each may come before that has to be done again.
+    fn scan_own(&mut self, robot: &RobotModel, frames: &[BodyFrame], sample: usize, look: impl FnMut(usize, &Meeting)) {
+        let stride = self.stride();
+        let free = &mut self.memory[sample * stride + 4 + self.joints + self.reaches.len()..(sample + 1) * stride];
+        self.own.scan(robot, frames, free, look);
+    }
+
+    /// Looks at every point that may miss the clearance: body and index, where it is from the base's origin (map axes), by how much it
     /// misses (m) and what it counts, and the field's gradient there. Notes how far each shape may move before that has to be done again.
     fn scan_in(
         &mut self,
@@ -348,7 +423,7 @@ impl ClearancePenalty {
         field: &impl DistanceField,
         position: [f64; 2],
         sample: usize,
-        mut look: impl FnMut(PointOf, Vector3<f64>, [f64; 2], Vector3<f64>),
+        mut look: impl FnMut((usize, usize), Vector3<f64>, [f64; 2], Vector3<f64>),
     ) {
         let stride = self.stride();
         let free = &mut self.memory[sample * stride + 4 + self.joints..(sample + 1) * stride];
@@ -384,8 +459,7 @@ impl ClearancePenalty {
                     let (distance, gradient) = look_up(field, arm + base, point.rise);
                     let short = self.clearance + point.radius - distance;
                     *free = free.min(-short / INTERPOLATION_SLOPE);
-                    let of = PointOf { body: shape.body, point: index };
-                    look(of, arm, [short, point.weight], Vector3::from(gradient));
+                    look((shape.body, index), arm, [short, point.weight], Vector3::from(gradient));
                 }
             }
         }

@@ -3,6 +3,7 @@
 
 pub mod clearance;
 pub mod joint;
+mod own_links;
 pub mod speed;
 pub mod turn;
 

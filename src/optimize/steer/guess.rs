@@ -17,6 +17,8 @@ const USED: f64 = 0.8;
 /// Longest piece on a straight, m; with joints that move; with joints, seconds of a joint's full speed a piece.
 const LONGEST: f64 = 2.5;
 const LONGEST_MOVING: f64 = 0.6;
+/// Parts between bends of the joints' way are at least this long, m.
+const SHORTEST_PART: f64 = 0.1;
 /// Quintics from rest to rest: peak speed and acceleration over distance / T and distance / T^2.
 const PEAK_SPEED: f64 = 1.875;
 const PEAK_ACCELERATION: f64 = 5.774;
@@ -59,6 +61,22 @@ struct Straight {
 }
 
 impl Straight {
+    /// Parts between two distances from its start (first, length), cut where the joints' way bends.
+    fn parts(&self, from: f64, length: f64) -> Vec<(f64, f64)> {
+        let bent = self.joints.windows(3).filter(|w| bends(&w[0].1, &w[1].1, &w[2].1)).map(|w| w[1].0);
+        let mut parts = vec![(from, length)];
+        for at in bent {
+            let last = parts.len() - 1;
+            let (start, rest) = parts[last];
+            let before = at - start;
+            if before.min(rest - before) >= SHORTEST_PART {
+                parts[last].1 = before;
+                parts.push((at, rest - before));
+            }
+        }
+        parts
+    }
+
     fn joints_at(&self, at: f64) -> Vec<f64> {
         let after = self.joints.iter().position(|(d, _)| *d >= at).unwrap_or(self.joints.len() - 1);
         if after == 0 {
@@ -126,7 +144,20 @@ struct Link {
     turn: f64,
 }
 
-/// Stands at a corner that the guess keeps: where a joint turns back, and first and last.
+/// Cosine of an angle between motions of the joints beyond which the guess goes round the corner, not across it.
+const BENT: f64 = 0.99;
+
+/// Whether the joints' way bends between three postures: neither straight on nor straight back.
+fn bends(a: &[f64], b: &[f64], c: &[f64]) -> bool {
+    let product = |p: [&[f64]; 2], q: [&[f64]; 2]| {
+        let steps = p[0].iter().zip(p[1]).zip(q[0].iter().zip(q[1]));
+        steps.map(|((p0, p1), (q0, q1))| (p1 - p0) * (q1 - q0)).sum::<f64>()
+    };
+    let (own, next, both) = (product([a, b], [a, b]), product([b, c], [b, c]), product([a, b], [b, c]));
+    own > 1e-12 && next > 1e-12 && both * both < BENT * BENT * own * next
+}
+
+/// Stands at a corner that the guess keeps: where a joint turns back or the joints' way bends, and first and last.
 fn kept(corner: &Corner) -> Vec<usize> {
     let n = corner.stands.len();
     let mut kept = vec![0];
@@ -135,7 +166,7 @@ fn kept(corner: &Corner) -> Vec<usize> {
         let back = |a: f64, b: f64, c: f64| (b - a) * (c - b) < -1e-12;
         let kink = |a: f64, b: f64, c: f64| ((b - a).abs() < 1e-9) != ((c - b).abs() < 1e-9);
         let joints = a.1.iter().zip(&b.1).zip(&c.1).any(|((a, b), c)| back(*a, *b, *c) || kink(*a, *b, *c));
-        if back(a.0, b.0, c.0) || joints {
+        if back(a.0, b.0, c.0) || joints || bends(&a.1, &b.1, &c.1) {
             kept.push(i);
         }
     }
@@ -244,16 +275,19 @@ pub(super) fn guess(path: &SearchPath, limits: &Limits) -> Option<Guess> {
         let middle = straight.length - head - tail;
         let moving =
             (0..limits.joints.len()).any(|j| straight.joints.windows(2).any(|w| (w[1].1[j] - w[0].1[j]).abs() > 1e-9));
-        let count = (middle / if moving { LONGEST_MOVING } else { LONGEST }).ceil().max(1.0) as usize;
-        for i in 1..=count {
-            let d = head + middle * i as f64 / count as f64;
-            let cap = if i == count { cap } else { cruise };
-            push(
-                &mut nodes,
-                &mut links,
-                on(d, cap),
-                Link { direction: straight.direction, length: middle / count as f64, turn: 0.0 },
-            );
+        let parts = straight.parts(head, middle);
+        for (part, (start, length)) in parts.iter().enumerate() {
+            let count = (length / if moving { LONGEST_MOVING } else { LONGEST }).ceil().max(1.0) as usize;
+            for i in 1..=count {
+                let d = start + length * i as f64 / count as f64;
+                let cap = if i == count && part + 1 == parts.len() { cap } else { cruise };
+                push(
+                    &mut nodes,
+                    &mut links,
+                    on(d, cap),
+                    Link { direction: straight.direction, length: length / count as f64, turn: 0.0 },
+                );
+            }
         }
         if rounding[k + 1].is_none() {
             push(

@@ -10,6 +10,7 @@ mod local;
 mod near;
 mod problem;
 mod solver;
+mod swing;
 
 use super::OptimizeOptions;
 use super::contour::Contour;
@@ -26,6 +27,7 @@ use guess::guess;
 use layout::Layout;
 use problem::{Problem, Weights};
 use solver::{Solved, SolverOptions, Workspace, close, solve};
+use swing::Swing;
 
 /// How to optimise heading and arc length.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,8 +40,8 @@ pub struct SteerOptions {
     pub motion_weight: f64,
     /// Weight of one contour point that misses the clearance by [`OptimizeOptions::clearance_scale`] for 1 s, s. Default 200.
     pub clearance_weight: f64,
-    /// Limits and clearance are looked at once in this distance, m (default 0.15), and in this time, s (default 0.2), of the first
-    /// guess.
+    /// Limits and clearance are looked at once in this distance, m (default 0.15), that the base drives or the joints move a shape, and
+    /// in this time, s (default 0.2), of the first guess.
     pub sample_distance: f64,
     /// See `sample_distance`.
     pub sample_time: f64,
@@ -104,6 +106,7 @@ pub fn optimize_steered<F: DistanceField>(
     };
     let spacing = options.contour_spacing.unwrap_or_else(|| field.cell().clamp(0.03, 0.08));
     let contour = Contour::new(robot, spacing);
+    let mut swing = Swing::new(robot, &contour);
     let clearance = ClearancePenalty::new(contour, robot, options.clearance, options.clearance_scale, field.cell());
     let own = &options.steer;
     let weights = Weights {
@@ -117,7 +120,7 @@ pub fn optimize_steered<F: DistanceField>(
     if let Some(leg) = from {
         take_over(layout, leg, &first.fixed, &mut x);
     }
-    let counts: Vec<usize> = (0..layout.pieces).map(|k| samples(layout, k, &x, own)).collect();
+    let counts: Vec<usize> = (0..layout.pieces).map(|k| samples(layout, k, &x, own, swing.of(layout, k, &x))).collect();
     let mut problem = Problem::new(robot, field, clearance, first.directions, first.fixed, &counts, weights);
     let solver =
         SolverOptions { max_iterations: own.max_iterations, tolerance: own.tolerance, gap_tolerance: GAP_TOLERANCE };
@@ -188,12 +191,12 @@ fn take_over(layout: Layout, leg: &SteerLeg, fixed: &[bool], x: &mut [f64]) {
     }
 }
 
-/// How often a piece is looked at: an even number.
-fn samples(layout: Layout, piece: usize, x: &[f64], options: &SteerOptions) -> usize {
+/// How often a piece is looked at: an even number. `swing`: how far the joints alone move any shape, m.
+fn samples(layout: Layout, piece: usize, x: &[f64], options: &SteerOptions, swing: f64) -> usize {
     let arc = |node: usize| x[layout.state(node, layout::ARC, 0)];
     let length = (arc(piece + 1) - arc(piece)).abs();
     let time = x[layout.duration(piece)].exp();
-    let count = (length / options.sample_distance).max(time / options.sample_time);
+    let count = (length.max(swing) / options.sample_distance).max(time / options.sample_time);
     2 * (0.5 * count.clamp(6.0, 40.0)).ceil() as usize
 }
 

@@ -4,7 +4,8 @@ use super::problem::{Derivatives, Problem, STIFFNESS, Weights};
 use super::*;
 use crate::geom::Pose2;
 use crate::math::fd::{numeric_gradient, relative_error};
-use crate::optimize::test_robot::{Boxes, robot};
+use crate::optimize::penalty::clearance::PointOf;
+use crate::optimize::test_robot::{Boxes, arm, robot};
 use crate::optimize::tests::{Broken, gap, path};
 use crate::trajectory::steered_curve::SteeredCurve;
 
@@ -58,21 +59,105 @@ fn the_gradient_matches_finite_differences() {
         let mut at = Derivatives::new(first.layout);
         assert!(problem.evaluate(&x, &multipliers, &mut at) > 20.0);
         assert!(problem.contacts.as_slice().len() > 5, "{} contour points are near", problem.contacts.as_slice().len());
-        let gradient = at.gradient.clone();
-        // The gaps' share is that of the multipliers and of their stiff square.
-        let mut whole = |x: &[f64]| {
-            let cost = problem.evaluate(x, &multipliers, &mut at);
-            let gaps = at.gaps.iter().zip(&multipliers).flat_map(|(gap, multiplier)| gap.iter().zip(multiplier));
-            cost + gaps.map(|(gap, multiplier)| gap * (multiplier + 0.5 * STIFFNESS * gap)).sum::<f64>()
-        };
-        let numeric = numeric_gradient(|x| whole(x), &x, 2e-6);
-        for (i, fixed) in first.fixed.iter().enumerate() {
-            let size = numeric.iter().fold(0.0f64, |most, v| most.max(v.abs()));
-            let numeric = if *fixed { 0.0 } else { numeric[i] };
-            let off = (gradient[i] - numeric).abs();
-            assert!(off < 1e-6 * size + 1e-5 * numeric.abs(), "{joints} joints, {i}: {} {numeric}", gradient[i]);
+        assert_gradient(&mut problem, &first, &x, &multipliers, &mut at, [2e-6, 1e-6], |_| true);
+    }
+}
+
+fn assert_gradient(
+    problem: &mut Problem<'_, Boxes>,
+    first: &Guess,
+    x: &[f64],
+    multipliers: &[[f64; 2]],
+    at: &mut Derivatives,
+    [step, tolerance]: [f64; 2],
+    looked_at: impl Fn(usize) -> bool,
+) {
+    let gradient = at.gradient.clone();
+    // The gaps' share is that of the multipliers and of their stiff square.
+    let mut whole = |x: &[f64]| {
+        let cost = problem.evaluate(x, multipliers, at);
+        let gaps = at.gaps.iter().zip(multipliers).flat_map(|(gap, multiplier)| gap.iter().zip(multiplier));
+        cost + gaps.map(|(gap, multiplier)| gap * (multiplier + 0.5 * STIFFNESS * gap)).sum::<f64>()
+    };
+    let numeric = numeric_gradient(|x| whole(x), x, step);
+    let those: Vec<usize> = (0..x.len()).filter(|i| looked_at(*i)).collect();
+    let size = those.iter().fold(0.0f64, |most, i| most.max(numeric[*i].abs()));
+    for i in those {
+        let numeric = if first.fixed[i] { 0.0 } else { numeric[i] };
+        let off = (gradient[i] - numeric).abs();
+        assert!(off < tolerance * (size + 10.0 * numeric.abs()), "{i}: {} {numeric} of {size}", gradient[i]);
+    }
+}
+
+#[test]
+fn the_guess_goes_round_bends_of_the_joints_way_and_across_straight_stretches() {
+    let robot = arm(3);
+    let limits = Limits::new(&robot, 1.0);
+    let steps = [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.5, 0.0), (0.0, 0.9, 0.0)];
+    let mut path = path(0, &steps);
+    // Every joint goes one way all along; standing it bends at the second state, driving at the fifth.
+    let postures =
+        [[0.0, 0.0, 0.0], [0.5, 0.1, 0.0], [0.6, 0.6, 0.2], [0.7, 0.7, 0.3], [0.8, 0.8, 0.4], [0.8, 1.4, 0.4]];
+    for (state, posture) in path.states.iter_mut().zip(postures) {
+        state.joints = posture.to_vec();
+    }
+    path.moves[..2].fill(SearchMove::Still);
+    let first = guess(&path, &limits).expect("it moves");
+    let at_node = |posture: [f64; 3]| {
+        let joint = |node: usize, j: usize| first.x[first.layout.state(node, 2 + j, 0)];
+        (0..=first.layout.pieces).any(|node| (0..3).all(|j| (joint(node, j) - posture[j]).abs() < 1e-9))
+    };
+    assert!(at_node(postures[1]) && at_node(postures[4]));
+    // Straight on: no node there but by chance.
+    assert!(!at_node(postures[3]));
+}
+
+/// An arm that is folded down to 6 mm above its own base while the base drives about.
+fn folded() -> (RobotModel, SearchPath) {
+    let robot = arm(4);
+    let pairs = robot.self_pairs();
+    let posture = |fold: f64| vec![0.3, 2.0, 0.2, fold];
+    // The last link comes down on the base as it folds.
+    let (mut apart, mut touching) = (0.0, 1.6);
+    assert!(robot.touching(&pairs, &posture(apart)).is_none() && robot.touching(&pairs, &posture(touching)).is_some());
+    while touching - apart > 1e-6 {
+        let middle = 0.5 * (apart + touching);
+        match robot.touching(&pairs, &posture(middle)) {
+            Some(_) => touching = middle,
+            None => apart = middle,
         }
     }
+    let (mut path, _) = mixed(0);
+    for state in &mut path.states {
+        state.joints = posture(apart - 0.03);
+    }
+    (robot, path)
+}
+
+#[test]
+fn the_gradient_where_own_links_are_near_each_other_matches_finite_differences() {
+    let (robot, path) = folded();
+    let first = guess(&path, &Limits::new(&robot, 1.0)).expect("it moves");
+    let field = Boxes(vec![]);
+    let mut problem = problem(&robot, &field, &first);
+    let mut x = disturbed(&first);
+    for node in 0..=first.layout.pieces {
+        for joint in 0..4 {
+            // Near, not overlapping.
+            let at = first.layout.state(node, 2 + joint, 0);
+            x[at] = first.x[at] + 1e-3 * (((node * 7 + joint * 3) % 5) as f64 - 2.0) * f64::from(node > 0);
+            (1..3).for_each(|order| x[at + order] = 0.0);
+        }
+    }
+    let multipliers = vec![[0.1, -0.2]; first.layout.pieces];
+    let mut at = Derivatives::new(first.layout);
+    problem.evaluate(&x, &multipliers, &mut at);
+    let near = problem.contacts.as_slice().iter().filter(|contact| matches!(contact.of, PointOf::Pair(_))).count();
+    assert!(near > 20, "{near}");
+    // Distances are found to 0.1 um, so the way between nearest points to some thousandths. Only joints feel it.
+    let block = first.layout.block();
+    let joint = |i: usize| i % block >= 6 && i % block < 18 && i.is_multiple_of(3);
+    assert_gradient(&mut problem, &first, &x, &multipliers, &mut at, [1e-4, 1e-2], joint);
 }
 
 #[test]
