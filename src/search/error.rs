@@ -39,7 +39,7 @@ pub enum SearchError {
     },
     /// The base alone gets there; with what moves on it no way was found among the postures that were sampled.
     #[error(
-        "no way to the goal was found with {postures} sampled postures of the joints, and none for the base alone was ruled out"
+        "no way to the goal was found with {postures} sampled postures of the joints, which does not prove that there is none"
     )]
     Sampled {
         /// Postures in the roadmap.

@@ -118,12 +118,22 @@ pub fn search(
         }
     }
     let problem = Problem { map, esdf, robot, query, options };
-    let postures = Postures::new(robot, query, 0);
+    for level in 1..Postures::levels(robot) {
+        if let Some(path) = quick(problem, Postures::new(robot, query, level - 1)) {
+            return Ok(path);
+        }
+    }
+    let postures = Postures::new(robot, query, Postures::levels(robot) - 1);
     if postures.count() <= 64 {
         solve::<1>(problem, postures)
     } else {
         solve::<{ posture::MOST_POSTURES / 64 }>(problem, postures)
     }
+}
+
+/// A path with few postures, where one is found soon.
+fn quick(problem: Problem<'_>, postures: Postures) -> Option<SearchPath> {
+    Solver::<{ posture::FEW_POSTURES / 64 }>::new(problem, postures).ok()?.guided()
 }
 
 /// Labels that the lattice search may make with a roadmap of postures: it proves nothing, and each takes long.
