@@ -268,6 +268,18 @@ impl<'a, const W: usize> Collider<'a, W> {
         self.moving.iter().filter(stays).filter_map(of).collect()
     }
 
+    /// An upright cylinder about the base's axis that holds all moving shapes in a posture: radius and heights, m.
+    pub fn column(&self, posture: usize) -> (f64, [f64; 2]) {
+        let (mut radius, mut heights) = (0.0f64, [f64::INFINITY, f64::NEG_INFINITY]);
+        for placed in &self.moving {
+            let pose = &placed.poses[posture];
+            let bounds = pose.bounds(&placed.convex);
+            radius = radius.max(pose.farthest_from_axis(&placed.convex));
+            heights = [heights[0].min(bounds.min[2]), heights[1].max(bounds.max[2])];
+        }
+        (radius, heights)
+    }
+
     /// Where a straight drive is tightest for the deepest point of the rigid shapes, m of it; `None`: it does not get through.
     pub fn tightest(&self, from: Pose2, to: Pose2) -> Option<f64> {
         let length = from.distance(to);

@@ -109,6 +109,14 @@ impl Postures {
         matches!(self.steps, Steps::Grid { .. })
     }
 
+    /// The posture in which the robot is folded up most, where that is known.
+    pub fn folded(&self) -> Option<usize> {
+        match self.steps {
+            Steps::Grid { .. } => None,
+            Steps::Roadmap(_) => Some(0),
+        }
+    }
+
     /// Whether a posture will do at an end where these joint values are asked for: it is the nearest one.
     pub fn agrees(&self, posture: usize, end: End, asked: &[Option<f64>]) -> bool {
         match &self.steps {

@@ -26,6 +26,9 @@ const SURE: usize = 2;
 const LEAST_TURN_COST: f64 = 0.1;
 const MOST_TURN_COST: f64 = 3.0;
 
+/// A clearance about a position, m.
+type Guess<'a> = Box<dyn Fn([f64; 2]) -> f64 + 'a>;
+
 /// What is searched.
 #[derive(Clone, Copy)]
 pub(super) struct Problem<'a> {
@@ -168,19 +171,43 @@ impl<'a, const W: usize> Solver<'a, W> {
         None
     }
 
-    /// The way through the middle of the free space, as often as it is worth a try.
+    /// The way through the middle of the free space, as often as it is worth a try. Of a robot that can fold up also that of the
+    /// folded one: the first leads where the base gets through, the second where most of what it carries does.
     fn through_the_middle(&self) -> Option<SearchPath> {
         let Problem { query, options, .. } = self.problem;
         let (guess, least) = self.guessed_clearance();
-        let mut guide = Guide::new(&self.lattice, guess, least);
+        let mut guides = vec![Guide::new(&self.lattice, Box::new(guess) as Guess<'a>, least)];
+        if let Some(posture) = self.collider.postures.folded() {
+            guides.push(Guide::new(&self.lattice, self.clearance_folded(posture), least));
+        }
         for attempt in 0..guide::tries(query) {
-            let route = guide.route(query, options, attempt)?;
-            match self.finish(&route, grain_of_try(attempt), &self.collider, 0) {
-                Ok(path) => return Some(path),
-                Err(places) => places.into_iter().for_each(|place| guide.avoid(place)),
+            for which in 0..guides.len() {
+                let Some(route) = guides[which].route(query, options, attempt) else {
+                    if which == 0 {
+                        return None;
+                    }
+                    guides.truncate(which);
+                    break;
+                };
+                match self.finish(&route, grain_of_try(attempt), &self.collider, 0) {
+                    Ok(path) => return Some(path),
+                    Err(places) => places.into_iter().for_each(|place| guides[which].avoid(place)),
+                }
             }
         }
         None
+    }
+
+    /// The clearance of an upright cylinder that holds all that moves in a posture, and of the core, about a position, m.
+    fn clearance_folded(&self, posture: usize) -> Guess<'a> {
+        let esdf = self.problem.esdf;
+        let (own, least) = self.guessed_clearance();
+        let (radius, [low, high]) = self.collider.column(posture);
+        let beyond = least - self.problem.options.clearance;
+        Box::new(move |[x, y]| {
+            let (distance, _) = esdf.least_above([x, y, low], high - low);
+            own([x, y]).min(distance - radius + beyond)
+        })
     }
 
     /// A path by the lattice search, or the proof that there is none, or neither after so many labels.
