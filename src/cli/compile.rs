@@ -185,7 +185,7 @@ fn page(kind: ReportKind, name: &str, inputs: &Inputs, outcome: &Outcome) -> Opt
         mission: name,
         report: &outcome.report,
         robot: world.map(|w| &w.robot),
-        map: world.and_then(|w| w.map.as_ref()),
+        map: world.and_then(|w| w.map.as_deref()),
         commands: outcome.compiled.as_ref().map(|c| &c.commands).or(outcome.traces.refused.as_ref()),
         ends: [mission.start.as_ref(), mission.goal.as_ref()],
         route: &outcome.traces.route,
