@@ -10,6 +10,7 @@ pub mod output;
 pub mod path_error;
 pub mod play;
 mod plot;
+mod products;
 pub mod robot;
 pub mod schema;
 pub mod terminal;

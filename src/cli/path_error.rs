@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::compile::seconds;
+use super::products::seconds;
 use super::inputs::{
     self,
     commands::{self, Places},

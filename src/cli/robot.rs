@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Subcommand;
 
-use super::compile::from_folder;
+use super::products::from_folder;
 use super::inputs::{Disk, folder_of};
 use super::output::write_file;
 use super::terminal::Terminal;

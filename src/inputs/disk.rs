@@ -143,7 +143,12 @@ impl Disk {
 
 impl Files for Disk {
     fn read(&mut self, path: &Path) -> io::Result<Vec<u8>> {
-        let bytes = self.bytes(path)?;
+        let bytes = self.bytes(path).inspect_err(|error| {
+            // Were it there, it would be read instead of a later candidate.
+            if error.kind() == io::ErrorKind::NotFound {
+                self.miss(path);
+            }
+        })?;
         let name = path.display().to_string();
         let mut meshes = self.meshes.borrow_mut();
         if !meshes.iter().any(|(known, _)| *known == name) {
