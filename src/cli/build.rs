@@ -91,7 +91,7 @@ pub fn build(args: &BuildArgs, terminal: &mut Terminal) -> Result<u8, Diagnostic
     };
     let hashes = Arc::new(Hashes::load(&start, out));
     let making = Making::new(&args.products, &hashes);
-    let plans: Vec<Plan> = missions.iter().map(|mission| plan(args, mission, &making, &hashes)).collect();
+    let plans: Vec<Plan> = missions.iter().map(|mission| plan(args, mission, &start, &making, &hashes)).collect();
     let mut rows: Vec<Row> = missions.iter().zip(&plans).map(|(mission, plan)| row(out, mission, plan)).collect();
     let jobs = jobs(args, &mut rows);
     if !args.dry_run {
@@ -111,13 +111,13 @@ pub fn build(args: &BuildArgs, terminal: &mut Terminal) -> Result<u8, Diagnostic
 }
 
 /// Whether a mission's folder holds.
-fn plan(args: &BuildArgs, mission: &Found, making: &Making, hashes: &Hashes) -> Plan {
+fn plan(args: &BuildArgs, mission: &Found, start: &Path, making: &Making, hashes: &Hashes) -> Plan {
     let folder = args.products.out.join(&mission.name);
     if args.force {
         return Plan::Make(vec![Stale::Forced]);
     }
     let Some(state) = State::read(&folder) else { return Plan::Make(vec![Stale::New]) };
-    let why = state.stale(&mission.path, &folder, making, hashes);
+    let why = state.stale(&mission.path, &folder, start, making, hashes);
     if why.is_empty() { Plan::Keep(state.ended) } else { Plan::Make(why) }
 }
 

@@ -183,11 +183,10 @@ impl Products<'_> {
         if args.format.contains(&Format::Trajectory) {
             files.push((Format::Trajectory.file(), json::write(&compiled.commands).into_bytes()));
         }
-        // One target, the first: build systems want no outputs named that they were not told of.
         let target = files.first().map_or(Format::Csv.file(), |(name, _)| name);
         files.push(("path_error.csv", csv::write_path_error(&outcome.report.path_error).into_bytes()));
         let read: Vec<PathBuf> = disk.paths().iter().map(|p| spelled(p, &start)).collect();
-        files.push(("commands.d", depfile(&spelled(&folder.join(target), &start), &read).into_bytes()));
+        files.push((DEPFILE, dependencies(&folder, target, &read, &start).into_bytes()));
         Ok(files)
     }
 
@@ -197,6 +196,15 @@ impl Products<'_> {
         let name = |path: &str| from_folder(&folder, &start.join(path));
         self.disk.meshes().into_iter().map(|(path, bytes)| (name(&path), bytes)).collect()
     }
+}
+
+/// The file that tells build systems what the commands depend on.
+pub const DEPFILE: &str = "commands.d";
+
+/// Its text: one target, the first command file, since build systems want no outputs named that they were not told of; and the files
+/// that were read, as spelled from the folder in which the program was started.
+pub fn dependencies(folder: &Path, target: &str, read: &[PathBuf], start: &Path) -> String {
+    depfile(&spelled(&folder.join(target), start), read)
 }
 
 /// The path that leads from a folder to a file, both absolute; with `..` where needed.

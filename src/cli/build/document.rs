@@ -145,9 +145,13 @@ impl Document {
     pub fn to_text(&self, keep_going: bool) -> String {
         let mut lines = vec![["mission", "status", "time", "clearance", "duration", "why"].map(str::to_owned)];
         lines.extend(self.missions.iter().map(cells));
-        let widths: Vec<usize> = (0..5)
-            .map(|column| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or_default())
-            .collect();
+        // Times below 100 s leave the columns where they are.
+        let mut widths = [0, 0, "99.99 s".len(), 0, 0];
+        for line in &lines {
+            for (width, cell) in widths.iter_mut().zip(line) {
+                *width = cell.chars().count().max(*width);
+            }
+        }
         let mut out = String::new();
         for line in &lines {
             let mut text = String::new();

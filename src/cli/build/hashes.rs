@@ -163,11 +163,10 @@ impl Hashes {
                 text += &format!("{} {size} {modified_ns} {changed_ns} {inode} {name}\n", hash.to_hex());
             }
         }
-        if let Ok(mut file) = tempfile::Builder::new().prefix(&format!("{CACHE}.")).suffix(".new").tempfile_in(out) {
-            use std::io::Write;
-            if file.write_all(text.as_bytes()).is_ok() {
-                let _ = file.persist(out.join(CACHE));
-            }
+        // One build at a time has the folder, so the name is nobody else's.
+        let new = out.join(format!("{CACHE}.new"));
+        if fs::write(&new, text).is_ok() {
+            let _ = fs::rename(&new, out.join(CACHE));
         }
     }
 }

@@ -78,7 +78,7 @@ impl Site<'_> {
         let state = State::new(path, &self.start, &self.making, &disk, &files, ended.clone());
         files.push((state::FILE, state.to_json().into_bytes()));
         publish(&self.args.out, name, &files, outcome.compiled.is_some())?;
-        state.wrote(&self.args.out.join(name), &self.hashes);
+        state.wrote(&self.args.out.join(name), &self.start, &self.hashes);
         Ok(Made { ended, diagnostics: outcome.diagnostics })
     }
 

@@ -10,8 +10,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::hashes::Hashes;
-use crate::cli::output::spelled;
-use crate::cli::products::{Product, ProductArgs};
+use crate::cli::output::{FILES, spelled};
+use crate::cli::products::{DEPFILE, Product, ProductArgs, dependencies};
 use crate::inputs::Disk;
 use crate::report::{Report, Status};
 
@@ -80,7 +80,8 @@ impl Making {
     pub fn new(args: &ProductArgs, hashes: &Hashes) -> Self {
         let program = std::env::current_exe().ok().and_then(|path| hashes.hash(&path).ok());
         let mut formats: Vec<String> = args.format.iter().map(|format| format.file().to_owned()).collect();
-        formats.sort();
+        // As they are written; `commands.d` is about the first.
+        formats.sort_by_key(|name| FILES.iter().position(|file| file == name));
         formats.dedup();
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -111,7 +112,8 @@ pub struct State {
     inputs: Vec<Input>,
     /// Files that would have been read, had they been there.
     absent: Vec<PathBuf>,
-    /// What was written, with its hash where that is always the same.
+    /// What was written, with its hash where that is always the same. (That of `commands.d`, which names its own folder, follows from
+    /// the rest.)
     outputs: BTreeMap<String, Option<String>>,
     /// How it ended.
     #[serde(flatten)]
@@ -170,7 +172,7 @@ impl State {
         let input =
             |(path, hash): &(PathBuf, blake3::Hash)| Input { path: spelled(path, start), blake3: hash.to_string() };
         let output = |(name, bytes): &Product| {
-            let hash = (*name != TIMINGS).then(|| blake3::hash(bytes).to_string());
+            let hash = (![TIMINGS, DEPFILE].contains(name)).then(|| blake3::hash(bytes).to_string());
             ((*name).to_owned(), hash)
         };
         Self {
@@ -198,16 +200,26 @@ impl State {
     }
 
     /// Notes the hashes of what was written, so that the next build need not read it.
-    pub fn wrote(&self, folder: &Path, hashes: &Hashes) {
+    pub fn wrote(&self, folder: &Path, start: &Path, hashes: &Hashes) {
         for (name, hash) in &self.outputs {
-            if let Some(hash) = hash.as_ref().and_then(|hash| blake3::Hash::from_hex(hash).ok()) {
+            if let Some(hash) = self.expected(name, hash.as_deref(), folder, start) {
                 hashes.wrote(&folder.join(name), hash);
             }
         }
     }
 
+    /// The hash that an output must have.
+    fn expected(&self, name: &str, hash: Option<&str>, folder: &Path, start: &Path) -> Option<blake3::Hash> {
+        if name == DEPFILE {
+            let read: Vec<PathBuf> = self.inputs.iter().map(|input| input.path.clone()).collect();
+            let text = dependencies(folder, self.making.formats.first()?, &read, start);
+            return Some(blake3::hash(text.as_bytes()));
+        }
+        blake3::Hash::from_hex(hash?).ok()
+    }
+
     /// All reasons why the folder does not hold what would be made now; none: it does.
-    pub fn stale(&self, mission: &Path, folder: &Path, making: &Making, hashes: &Hashes) -> Vec<Stale> {
+    pub fn stale(&self, mission: &Path, folder: &Path, start: &Path, making: &Making, hashes: &Hashes) -> Vec<Stale> {
         let mut why = Vec::new();
         let own = &self.making;
         if (&own.version, &own.program_blake3) != (&making.version, &making.program_blake3) {
@@ -233,11 +245,11 @@ impl State {
         let (mut missing, mut touched) = (Vec::new(), Vec::new());
         for (name, hash) in &self.outputs {
             let path = folder.join(name);
-            match hash {
+            match self.expected(name, hash.as_deref(), folder, start) {
                 None if path.is_file() => {}
                 None => missing.push(path),
                 Some(own) => match hashes.hash(&path) {
-                    Ok(hash) if *hash.to_hex() == **own => {}
+                    Ok(hash) if hash == own => {}
                     Ok(_) => touched.push(path),
                     Err(_) => missing.push(path),
                 },
