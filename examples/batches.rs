@@ -1,12 +1,16 @@
 //! What `trajc build` saves: a build with nothing to do, two workers against one, a shared map, memory.
 //!
-//! `cargo build --release && cargo run --release --example batches [MISSIONS]`: runs the program beside it on missions that it makes in a
-//! temporary folder (1000 by default; a tenth of them on a large map). Runs to be compared take turns; the least time of each counts.
+//! `cargo build --release && cargo run --release --example batches [MISSIONS]`: runs the program beside it on missions that it makes
+//! (or the one that `TRAJC` names) in a temporary folder (1000 by default; a tenth of them on a large map). Runs to be compared take turns; the least time of each counts.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
+
+use trajc::esdf;
+use trajc::map::VoxelMap;
+use trajc::mission::Unknown;
 
 /// Cells along x and y of the large map, 5 cm each, and along z.
 const LARGE: [usize; 3] = [2000, 2000, 8];
@@ -102,6 +106,34 @@ fn mission(map: &str, robot: &str, k: usize, across: usize) -> String {
     )
 }
 
+/// Would the distance field be read faster from a file than it is built? Unpacked, in the system's memory already: the best case.
+fn field_on_disk(file: &Path, post: impl Fn(usize, usize) -> bool) {
+    let mut map = VoxelMap::new(0.05, [0.0; 3], LARGE, Unknown::Occupied);
+    for i in 0..LARGE[0] {
+        for j in (0..LARGE[1]).filter(|j| post(i, *j)) {
+            (0..LARGE[2]).for_each(|k| map.occupy([i, j, k]));
+        }
+    }
+    let nodes: usize = LARGE.iter().map(|n| n + 1).product();
+    fs::write(file, vec![1u8; 4 * nodes]).expect("room");
+    let (mut build, mut read) = (f64::INFINITY, f64::INFINITY);
+    for _ in 0..3 {
+        let started = Instant::now();
+        drop(std::hint::black_box(esdf::build(&map)));
+        build = build.min(started.elapsed().as_secs_f64());
+        let started = Instant::now();
+        let bytes = fs::read(file).expect("just written");
+        // What makes sure that it is the field that was written.
+        std::hint::black_box(blake3::hash(&bytes));
+        read = read.min(started.elapsed().as_secs_f64());
+    }
+    let (ms, size) = (1e3 * build, 4 * nodes / 1_000_000);
+    println!(
+        "distance field of the large map: {ms:.0} ms to build; {:.0} ms to read {size} MB of it and check them",
+        1e3 * read
+    );
+}
+
 fn copy(from: &Path, to: &Path) {
     fs::create_dir_all(to).expect("folders");
     for entry in fs::read_dir(from).expect("shipped") {
@@ -114,7 +146,8 @@ fn main() {
     let many: usize = std::env::args().nth(1).map_or(1000, |text| text.parse().expect("a number of missions"));
     let few = many / 10;
     let own = std::env::current_exe().expect("this program");
-    let program = own.parent().and_then(Path::parent).expect("target/release").join("trajc");
+    let beside = own.parent().and_then(Path::parent).expect("target/release").join("trajc");
+    let program = std::env::var_os("TRAJC").map_or(beside, PathBuf::from);
     let site = Site { folder: tempfile::tempdir().expect("a temporary folder"), program };
     copy(&Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/box_base"), &site.path("robots/box_base"));
     let robot = "../robots/box_base/robot.yaml";
@@ -136,6 +169,7 @@ fn main() {
         site.write(&format!("many/m{k:04}.yaml"), mission("../maps/small.npy", robot, k, 6).as_bytes());
     }
     println!("load: {}", fs::read_to_string("/proc/loadavg").unwrap_or_default().trim());
+    field_on_disk(&site.path("field"), post);
 
     let build = |folder: &str, jobs: &str| site.run(&["build", folder, "-j", jobs, "--force"]);
     let two = site.compare(3, &[&|| build("few", "1"), &|| build("few", "2")]);
