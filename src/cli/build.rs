@@ -98,10 +98,11 @@ pub fn build(args: &BuildArgs, terminal: &mut Terminal) -> Result<u8, Diagnostic
         for job in &jobs {
             rows[job.index].status = RowStatus::NotTried;
         }
+        let total = jobs.len();
         let jobs = jobs.iter().map(|job| Job { map: shared_map(&missions[job.index]), ..*job }).collect();
         let schedule = Schedule::new(jobs);
         let site = Site { args: &args.products, start, making, hashes: hashes.clone(), schedule };
-        compile(args, &site, &missions, &mut rows, terminal);
+        compile(args, &site, total, &missions, &mut rows, terminal);
         hashes.save(out);
     }
     let code = rows.iter().map(|row| row.exit_code).max().unwrap_or_default();
@@ -170,9 +171,15 @@ fn shared_map(mission: &Found) -> Option<schedule::MapKey> {
 }
 
 /// Compiles what is scheduled, and notes in the rows what came of it.
-fn compile(args: &BuildArgs, site: &Site<'_>, missions: &[Found], rows: &mut [Row], terminal: &mut Terminal) {
+fn compile(
+    args: &BuildArgs,
+    site: &Site<'_>,
+    total: usize,
+    missions: &[Found],
+    rows: &mut [Row],
+    terminal: &mut Terminal,
+) {
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-    let total = rows.iter().filter(|row| row.status == RowStatus::NotTried && !row.why.is_empty()).count();
     let workers = args.jobs.map_or_else(cores, usize::from).min(total);
     let progress = terminal.progress("build");
     let (mut at_work, mut done, mut failed) = (BTreeSet::new(), 0, 0);
