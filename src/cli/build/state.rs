@@ -255,14 +255,12 @@ impl State {
                 },
             }
         }
-        let lists: [(fn(Vec<PathBuf>) -> Stale, Vec<PathBuf>); 5] = [
-            (Stale::Changed, changed),
-            (Stale::Gone, gone),
-            (Stale::Appeared, appeared),
-            (Stale::Missing, missing),
-            (Stale::Touched, touched),
-        ];
-        why.extend(lists.into_iter().filter(|(_, paths)| !paths.is_empty()).map(|(of, paths)| of(paths)));
+        let some = |of: fn(Vec<PathBuf>) -> Stale, paths: Vec<PathBuf>| (!paths.is_empty()).then(|| of(paths));
+        why.extend(some(Stale::Changed, changed));
+        why.extend(some(Stale::Gone, gone));
+        why.extend(some(Stale::Appeared, appeared));
+        why.extend(some(Stale::Missing, missing));
+        why.extend(some(Stale::Touched, touched));
         why
     }
 }
