@@ -1,9 +1,11 @@
 //! `compile()`: every stage, in order. Read this file first.
 
 mod check;
+mod place;
 mod world;
 
 pub use check::{check, path_error_of_commands};
+pub use place::Place;
 pub use world::world;
 
 use std::time::Instant;
@@ -11,7 +13,6 @@ use std::time::Instant;
 use crate::certify::{self, Certificate, Goal, RefusalKind, Task};
 use crate::command::{self, CommandTable, SampleOptions};
 use crate::diag::{Diagnostic, Diagnostics};
-use crate::esdf;
 use crate::geom::{Pose2, wrap_angle};
 use crate::map::VoxelMap;
 use crate::mission::{Mission, Parameterisation, PathSpec, PoseSpec};
@@ -129,7 +130,7 @@ pub struct World {
     /// The robot, with the mission's limits.
     pub robot: RobotModel,
     /// Where the obstacles are.
-    pub map: Option<VoxelMap>,
+    pub map: Option<Place>,
 }
 
 /// Clearance beyond what must be certified that the search asks for first, m: what held commands may leave of a path.
@@ -186,7 +187,28 @@ impl<'a> Run<'a> {
 /// Compiles one mission. `progress` is told the name of each stage as it begins.
 pub fn compile(inputs: &mut Inputs, options: &CompileOptions, progress: &mut dyn FnMut(&'static str)) -> Outcome {
     let mut run = Run::new(inputs_part(inputs), progress);
-    let result = run.stage("read", || world(inputs)).and_then(|world| {
+    let world = run.stage("read", || world(inputs));
+    compile_there(run, inputs, world, options)
+}
+
+/// The same of a mission whose robot and map are there already, as [`world`] makes them; `named`: the files, for the report.
+pub fn compile_on(
+    inputs: &Inputs,
+    named: InputsPart,
+    world: World,
+    options: &CompileOptions,
+    progress: &mut dyn FnMut(&'static str),
+) -> Outcome {
+    compile_there(Run::new(named, progress), inputs, Ok(world), options)
+}
+
+fn compile_there(
+    mut run: Run<'_>,
+    inputs: &Inputs,
+    world: Result<World, Diagnostics>,
+    options: &CompileOptions,
+) -> Outcome {
+    let result = world.and_then(|world| {
         let trajectory = match &inputs.mission.path {
             Some(path) => given_path(&inputs.mission, path, inputs.path_csv.as_ref(), &world.robot).map(Some),
             None => Ok(None),
@@ -217,8 +239,8 @@ fn stages(
     let sampling_time = options.sampling_time.unwrap_or(mission.sampling_time);
     let World { robot, map } = world;
     run.report.robot = Some(robot.into());
-    run.report.map = map.as_ref().map(Into::into);
-    let finish = Finish { mission, robot, map: map.as_ref(), sampling_time };
+    run.report.map = map.as_deref().map(Into::into);
+    let finish = Finish { mission, robot, map: map.as_deref(), sampling_time };
     let made = match (given, map) {
         (Some(trajectory), _) => finish.certify(run, trajectory)?,
         (None, Some(map)) => plan(run, &finish, map, options)?,
@@ -274,17 +296,17 @@ enum Look {
 }
 
 /// Searches and optimises until something is certified; the search's own path is the last try.
-fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, compile: &CompileOptions) -> Result<Made, Diagnostics> {
+fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &Place, compile: &CompileOptions) -> Result<Made, Diagnostics> {
     let asked = compile.parameterisation.unwrap_or(finish.mission.parameterisation);
     let (mission, robot) = (finish.mission, finish.robot);
-    let field = run.stage("esdf", || esdf::build(map));
+    let field = run.stage("esdf", || map.field());
     let query = query(mission, robot);
     let found = run.stage("search", || {
         let options = |margin: f64| SearchOptions { clearance: mission.clearance + margin, reverse: mission.reverse };
         // What fits only without the margin is found too, and what is absent is absent without it.
-        search::search(map, &field, robot, &query, &options(SEARCH_MARGIN)).or_else(|error| match error {
+        search::search(map, field, robot, &query, &options(SEARCH_MARGIN)).or_else(|error| match error {
             SearchError::OffMap { .. } | SearchError::Limit { .. } | SearchError::Sampled { .. } => Err(error),
-            _ => search::search(map, &field, robot, &query, &options(0.0)),
+            _ => search::search(map, field, robot, &query, &options(0.0)),
         })
     });
     let path = found.map_err(|error| place_search_error(mission, &error))?;
@@ -316,8 +338,8 @@ fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, compile: &Compil
             options.clearance += MISSED_TIMES * missed;
         }
         let trajectory = run.stage("optimize", || match refused.take().filter(|_| look == Look::Again) {
-            Some(refused) => optimize::resume(&path, &field, robot, &options, &refused),
-            None => optimize::optimize(&path, &field, robot, &options),
+            Some(refused) => optimize::resume(&path, field, robot, &options, &refused),
+            None => optimize::optimize(&path, field, robot, &options),
         });
         refused = Some(trajectory.clone());
         // A trajectory that no law can time is one more reason to go on to the next try.
@@ -535,7 +557,8 @@ fn profile_part(profile: &MotionProfile, commands: &CommandTable) -> ProfilePart
     }
 }
 
-fn inputs_part(inputs: &Inputs) -> InputsPart {
+/// The files that a mission names, as its report lists them.
+pub fn inputs_part(inputs: &Inputs) -> InputsPart {
     let mission = &inputs.mission;
     let file = |path: &str, bytes: &[u8]| InputFile::new(path, bytes);
     let robot = inputs.robot_yaml.as_ref().unwrap_or(&inputs.urdf);

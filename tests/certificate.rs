@@ -32,7 +32,7 @@ struct Compiled {
 fn compiled(mission: &str) -> Compiled {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("missions/{mission}.yaml"));
     let (mut inputs, _) = inputs::read(&path).expect("shipped");
-    let map = pipeline::world(&mut inputs).expect("shipped").map.expect("has a map");
+    let map = VoxelMap::clone(&pipeline::world(&mut inputs).expect("shipped").map.expect("has a map"));
     let outcome = pipeline::compile(&mut inputs, &CompileOptions::default(), &mut |_| {});
     let done = outcome.compiled.expect("certified");
     assert!(done.certificate.holds());

@@ -182,6 +182,24 @@ fn reports_of_every_ending_are_what_the_schema_says() {
 }
 
 #[test]
+fn builds_of_every_ending_are_what_the_schema_says() {
+    let schema = Schema::of("build", true);
+    let sandbox = Sandbox::new();
+    sandbox.write("missions/b.yaml", sandbox.text("missions/a.yaml").replace("x_m: 3.4", "x_m: 2.0"));
+    sandbox.write("missions/c.yaml", "robot: 3\n");
+    let mut seen = std::collections::BTreeSet::new();
+    for (args, code) in [(&["-n"][..], 0), (&["-k"], 2), (&["-k"], 2), (&[], 1)] {
+        let run = sandbox.run(&[&["build", "--json"], args].concat()).expect(code);
+        let document: Value = serde_json::from_str(&run.stdout).expect("JSON");
+        assert_eq!(schema.faults(&document), [""; 0], "{args:?}");
+        let rows = document["missions"].as_array().expect("missions").clone();
+        seen.extend(rows.iter().map(|row| row["status"].as_str().expect("a word").to_owned()));
+    }
+    let all = ["certified", "failed", "failed_before", "not_tried", "to_compile", "up_to_date"];
+    assert!(seen.iter().eq(&all), "{seen:?}");
+}
+
+#[test]
 fn the_schema_of_reports_refuses_what_is_no_report() {
     let schema = Schema::of("report", true);
     let sandbox = Sandbox::compiled();

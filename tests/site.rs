@@ -57,7 +57,7 @@ fn under_the_tape(robot: &RobotModel, blade: f64) -> (CommandTable, Task) {
 
 fn judged(world: &World, blade: f64) -> Certificate {
     let (table, task) = under_the_tape(&world.robot, blade);
-    certify(&table, &world.robot, world.map.as_ref(), &task)
+    certify(&table, &world.robot, world.map.as_deref(), &task)
 }
 
 /// Least distance of any corner of any box of the robot from any obstacle, by brute force at every row and ten times between.

@@ -24,6 +24,8 @@ pub(super) struct Obstacles<'a> {
     map: &'a VoxelMap,
     /// Union of the columns of each block of columns, `words` each, in order `(i / BLOCK) * across + j / BLOCK`.
     blocks: Vec<u64>,
+    /// Blocks that are summarised: of a large map only those that something came near.
+    summarised: Vec<bool>,
     across: usize,
     words: usize,
     /// The sides of the rectangle where the outside is an obstacle.
@@ -51,19 +53,12 @@ struct Scratch {
 }
 
 impl<'a> Obstacles<'a> {
-    /// Summarises a map.
+    /// Of a map, which is looked at where it is asked for.
     pub(super) fn new(map: &'a VoxelMap) -> Self {
         let (along, across) = (map.dims[0].div_ceil(BLOCK), map.dims[1].div_ceil(BLOCK));
         let words = map.column(0, 0).len();
-        let mut blocks = vec![0; along * across * words];
-        for i in 0..map.dims[0] {
-            for j in 0..map.dims[1] {
-                let at = ((i / BLOCK) * across + j / BLOCK) * words;
-                for (summary, word) in blocks[at..at + words].iter_mut().zip(map.column(i, j)) {
-                    *summary |= word;
-                }
-            }
-        }
+        let blocks = vec![0; along * across * words];
+        let summarised = vec![false; along * across];
         let bounds = map.bounds();
         let sides =
             [(0, -1.0, bounds.min[0]), (0, 1.0, bounds.max[0]), (1, -1.0, bounds.min[1]), (1, 1.0, bounds.max[1])];
@@ -71,7 +66,7 @@ impl<'a> Obstacles<'a> {
             Unknown::Occupied => sides.map(|(axis, sign, at)| Edge { axis, sign, at }).to_vec(),
             Unknown::Free => Vec::new(),
         };
-        Self { map, blocks, across, words, edges, scratch: Scratch::default() }
+        Self { map, blocks, summarised, across, words, edges, scratch: Scratch::default() }
     }
 
     /// Boxes that together fill exactly the occupied cells whose cubes meet `window`; appended to `out`. Returns the number of
@@ -90,6 +85,7 @@ impl<'a> Obstacles<'a> {
                 return 0;
             }
         }
+        self.summarise(low, high);
         let mut columns = 0;
         let mut scratch = std::mem::take(&mut self.scratch);
         scratch.merged.clear();
@@ -113,6 +109,25 @@ impl<'a> Obstacles<'a> {
         out.extend(scratch.merged.iter().map(|cells| Aabb { min: corner(cells.low), max: corner(cells.high) }));
         self.scratch = scratch;
         columns
+    }
+
+    /// Summarises the blocks that hold cells `low` to `high` (exclusive) in x and y, as far as they are not yet.
+    fn summarise(&mut self, low: [usize; 3], high: [usize; 3]) {
+        let [nx, ny, _] = self.map.dims;
+        for block_i in low[0] / BLOCK..=(high[0] - 1) / BLOCK {
+            for block_j in low[1] / BLOCK..=(high[1] - 1) / BLOCK {
+                let block = block_i * self.across + block_j;
+                if std::mem::replace(&mut self.summarised[block], true) {
+                    continue;
+                }
+                let summary = &mut self.blocks[block * self.words..(block + 1) * self.words];
+                for i in block_i * BLOCK..((block_i + 1) * BLOCK).min(nx) {
+                    for j in block_j * BLOCK..((block_j + 1) * BLOCK).min(ny) {
+                        summary.iter_mut().zip(self.map.column(i, j)).for_each(|(summary, word)| *summary |= word);
+                    }
+                }
+            }
+        }
     }
 
     /// Cubes of the occupied cells that fill a box made by [`Obstacles::near`].

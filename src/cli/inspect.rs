@@ -172,7 +172,7 @@ fn of_mission(path: &Path) -> Result<Understood, Diagnostics> {
         "sampling_time_s": mission.sampling_time,
         "reads": disk.paths(),
         "robot": RobotPart::from(&world.robot),
-        "map": world.map.as_ref().map(MapPart::from),
+        "map": world.map.as_deref().map(MapPart::from),
     });
     Ok(Understood { text: out, json, figure: plot::mission(mission, &world) })
 }

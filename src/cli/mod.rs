@@ -1,6 +1,7 @@
 //! The command line: one file per subcommand. Exit codes: 0 done and certified, 1 no trajectory or no certificate, 2 bad
 //! input or usage.
 
+pub mod build;
 pub mod check;
 pub mod compile;
 pub mod completions;
@@ -10,6 +11,7 @@ pub mod output;
 pub mod path_error;
 pub mod play;
 mod plot;
+mod products;
 pub mod robot;
 pub mod schema;
 pub mod terminal;
@@ -40,6 +42,7 @@ struct Args {
 #[derive(Debug, Subcommand)]
 enum Command {
     Compile(compile::CompileArgs),
+    Build(build::BuildArgs),
     Check(check::CheckArgs),
     PathError(path_error::PathErrorArgs),
     Play(play::PlayArgs),
@@ -67,6 +70,7 @@ pub fn main() -> u8 {
     terminal.quiet = args.quiet;
     let result = match &args.command {
         Command::Compile(args) => compile::compile(args, &mut terminal),
+        Command::Build(args) => build::build(args, &mut terminal),
         Command::Check(args) => check::check(args, &mut terminal),
         Command::PathError(args) => path_error::path_error(args, &mut terminal),
         Command::Play(args) => play::play(args, &mut terminal),

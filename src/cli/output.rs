@@ -14,7 +14,7 @@ use crate::diag::{Describe, Diagnostic, Diagnostics};
 pub use depfile::{depfile, spelled};
 
 /// Every file that this program writes into an output folder, command files first.
-pub const FILES: [&str; 9] = [
+pub const FILES: [&str; 10] = [
     "commands.csv",
     "commands.mcap",
     "trajectory.json",
@@ -24,6 +24,7 @@ pub const FILES: [&str; 9] = [
     "report.html",
     "report.svg",
     "timings.json",
+    "build.json",
 ];
 
 /// A file or folder that could not be made, moved or removed.
@@ -223,11 +224,22 @@ fn lock(folder: &Path) -> Option<File> {
 /// Removes what runs of this mission left that were killed: temporary folders whose maker no longer holds their lock.
 /// Where locks do not work they stay, and do no harm.
 fn clear_leftovers(parent: &Path, mission: &str) {
+    clear_leftovers_of(parent, &|name| name == mission);
+}
+
+/// The same of all missions.
+pub(super) fn sweep(out: &Path) {
+    // As `target` has it: the process may stand in a folder that is replaced.
+    if let Ok(out) = std::path::absolute(out) {
+        clear_leftovers_of(&out, &|_| true);
+    }
+}
+
+fn clear_leftovers_of(parent: &Path, wanted: &dyn Fn(&str) -> bool) {
     for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
         let name = entry.file_name();
-        let Some(name) = name.to_str() else { continue };
-        let ours = name.starts_with(&prefix(mission)) && (name.ends_with(".new") || name.ends_with(".old"));
-        if !ours || !entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+        let Some(mission) = name.to_str().and_then(left_by).filter(|mission| wanted(mission)) else { continue };
+        if !entry.file_type().is_ok_and(|kind| kind.is_dir()) {
             continue;
         }
         let Some(_lock) = lock(&entry.path()) else { continue };
@@ -243,6 +255,30 @@ fn clear_leftovers(parent: &Path, mission: &str) {
         }
         let _ = remove_ours(&folder);
         let _ = fs::remove_dir(&folder);
+    }
+}
+
+/// The mission whose temporary folder has this name.
+fn left_by(name: &str) -> Option<&str> {
+    let (mission, rest) = name.strip_prefix('.')?.rsplit_once(".trajc-")?;
+    (rest.ends_with(".new") || rest.ends_with(".old")).then_some(mission)
+}
+
+/// The output folders' own lock, for builds: two of them would write the same. Held until it is dropped; `None`: locks do not work here.
+///
+/// # Errors
+/// Somebody else holds it.
+pub(super) fn lock_all(out: &Path) -> Result<Option<File>, Diagnostics> {
+    let Ok(file) = File::open(out) else { return Ok(None) };
+    match file.try_lock() {
+        Ok(()) => Ok(Some(file)),
+        Err(fs::TryLockError::Error(_)) => Ok(None),
+        Err(fs::TryLockError::WouldBlock) => {
+            let message = format!("another build is at work in `{}`", out.display());
+            Err(Diagnostic::error("build/locked", message)
+                .hint("wait for it, or choose another folder with `--out DIR`")
+                .into())
+        }
     }
 }
 

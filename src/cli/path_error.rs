@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use super::compile::seconds;
 use super::inputs::{
     self,
     commands::{self, Places},
 };
 use super::output::write_file;
 use super::plot;
+use super::products::seconds;
 use super::terminal::Terminal;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::emit::csv;

@@ -96,7 +96,7 @@ fn bezier(points: &[[f64; 2]; 4], k: usize) -> [f64; 2] {
 pub(super) fn commands(name: &str, table: &CommandTable, world: Option<&World>) -> Figure {
     let robot = world.map(|w| &w.robot);
     let places: Vec<[f64; 2]> = motion::states(table).iter().map(|(pose, _)| [pose.x, pose.y]).collect();
-    let mut view = match world.and_then(|w| w.map.as_ref().zip(robot)) {
+    let mut view = match world.and_then(|w| w.map.as_deref().zip(robot)) {
         Some((map, robot)) => TopView::of_map(map, place::least_top(robot)),
         None => TopView::around(places.iter().copied(), AROUND),
     };

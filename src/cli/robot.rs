@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Subcommand;
 
-use super::compile::from_folder;
 use super::inputs::{Disk, folder_of};
 use super::output::write_file;
+use super::products::from_folder;
 use super::terminal::Terminal;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::robot::{self, InitInputs};

@@ -1,7 +1,8 @@
-//! `trajc schema mission|robot|report`: JSON Schemas, for editors and validators.
+//! `trajc schema mission|robot|report|build`: JSON Schemas, for editors and validators.
 
 use serde_json::Value;
 
+use super::build;
 use super::terminal::Terminal;
 use crate::diag::Diagnostics;
 use crate::{mission, report, robot};
@@ -22,6 +23,8 @@ pub enum SchemaOf {
     Robot,
     /// report.json.
     Report,
+    /// What `build --json` prints.
+    Build,
 }
 
 /// Prints the schema.
@@ -39,6 +42,7 @@ pub fn text(of: SchemaOf) -> String {
         SchemaOf::Mission => pretty(&mission::json_schema()),
         SchemaOf::Robot => pretty(&robot::spec::json_schema()),
         SchemaOf::Report => report::json_schema(),
+        SchemaOf::Build => build::json_schema(),
     }
 }
 
@@ -53,7 +57,7 @@ mod tests {
 
     #[test]
     fn a_schema_is_json_that_names_its_draft() {
-        for of in [SchemaOf::Mission, SchemaOf::Robot, SchemaOf::Report] {
+        for of in [SchemaOf::Mission, SchemaOf::Robot, SchemaOf::Report, SchemaOf::Build] {
             let schema: Value = serde_json::from_str(&text(of)).expect("JSON");
             assert_eq!(schema["$schema"], "https://json-schema.org/draft/2020-12/schema");
         }

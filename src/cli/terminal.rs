@@ -74,6 +74,21 @@ impl Progress {
             bar.set_message(name);
         }
     }
+
+    /// Says how far it is.
+    pub fn say(&self, text: impl FnOnce() -> String) {
+        if let Some(bar) = &self.0 {
+            bar.set_message(text());
+        }
+    }
+
+    /// Does something that prints, the line out of its way.
+    pub fn aside<T>(&self, work: impl FnOnce() -> T) -> T {
+        match &self.0 {
+            Some(bar) => bar.suspend(work),
+            None => work(),
+        }
+    }
 }
 
 impl Drop for Progress {

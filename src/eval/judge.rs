@@ -98,7 +98,7 @@ pub fn judge(
     let started = Instant::now();
     let map = set.voxels(scene)?;
     let voxelised = started.elapsed().as_secs_f64() * 1e3;
-    let world = World { robot: robot.clone(), map: Some(map) };
+    let world = World { robot: robot.clone(), map: Some(map.into()) };
     let outcome = pipeline::compile_in(&set.mission(scene), &world, options);
     let report = &outcome.report;
     let trajectory = report.trajectory.as_ref();

@@ -138,7 +138,7 @@ impl CommandFile {
             None if self.attachments.is_empty() => Origin::Mission(named.clone()),
             None => Origin::Attached,
         };
-        let map = |meant: PathBuf| match (with_map, places.map) {
+        let map = |_: &mission::Mission, meant: PathBuf| match (with_map, places.map) {
             (false, _) => Ok(None),
             (true, asked) if origin == Origin::Attached => self.recorded_map(meant, asked).map(Some),
             (true, asked) => Ok(Some(asked.map_or(meant, Path::to_path_buf))),

@@ -14,9 +14,16 @@ use crate::robot::Files;
 /// A file's name and bytes.
 pub type Named = (String, Vec<u8>);
 
+/// Reads a file's bytes and their hash.
+pub type ReadFile = dyn Fn(&Path) -> io::Result<(Vec<u8>, blake3::Hash)>;
+
 /// Reads files and remembers which.
 #[derive(Clone, Default)]
 pub struct Disk {
+    /// Who reads instead of the disk itself.
+    reader: Option<Rc<ReadFile>>,
+    /// Files that may lie beside others and were not there.
+    absent: Rc<RefCell<Vec<PathBuf>>>,
     /// Path and hash of each file read, in order.
     read: Rc<RefCell<Vec<(PathBuf, blake3::Hash)>>>,
     /// What the robot stage read.
@@ -30,6 +37,34 @@ impl Disk {
     /// them has. Maps still come from the disk.
     pub(super) fn attached(files: BTreeMap<PathBuf, Vec<u8>>) -> Self {
         Self { attached: Some(Rc::new(files)), ..Self::default() }
+    }
+
+    /// Files are read by somebody else, who may know their hashes.
+    pub fn through(reader: Rc<ReadFile>) -> Self {
+        Self { reader: Some(reader), ..Self::default() }
+    }
+
+    /// Files read so far with their hashes, in order, each once.
+    pub fn files(&self) -> Vec<(PathBuf, blake3::Hash)> {
+        self.read.borrow().clone()
+    }
+
+    /// Files that would have been read too, had they been there.
+    pub fn absent(&self) -> Vec<PathBuf> {
+        self.absent.borrow().clone()
+    }
+
+    /// Counts a file as read whose bytes somebody else has read.
+    pub fn know(&self, path: &Path, hash: blake3::Hash) {
+        let mut read = self.read.borrow_mut();
+        if !read.iter().any(|(known, _)| known == path) {
+            read.push((path.to_path_buf(), hash));
+        }
+    }
+
+    /// Counts a file as missed.
+    pub fn miss(&self, path: &Path) {
+        self.absent.borrow_mut().push(path.to_path_buf());
     }
 
     /// Paths of all files read so far, in order, each once.
@@ -52,9 +87,8 @@ impl Disk {
     }
 
     fn remember(&self, path: &Path, bytes: Vec<u8>) -> Vec<u8> {
-        let mut read = self.read.borrow_mut();
-        if !read.iter().any(|(known, _)| known == path) {
-            read.push((path.to_path_buf(), blake3::hash(&bytes)));
+        if !self.read.borrow().iter().any(|(known, _)| known == path) {
+            self.know(path, blake3::hash(&bytes));
         }
         bytes
     }
@@ -63,7 +97,10 @@ impl Disk {
         if path.is_dir() {
             return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a folder"));
         }
-        Ok(self.remember(path, std::fs::read(path)?))
+        let Some(reader) = &self.reader else { return Ok(self.remember(path, std::fs::read(path)?)) };
+        let (bytes, hash) = reader(path)?;
+        self.know(path, hash);
+        Ok(bytes)
     }
 
     /// A text or mesh.
@@ -106,7 +143,12 @@ impl Disk {
 
 impl Files for Disk {
     fn read(&mut self, path: &Path) -> io::Result<Vec<u8>> {
-        let bytes = self.bytes(path)?;
+        let bytes = self.bytes(path).inspect_err(|error| {
+            // Were it there, it would be read instead of a later candidate.
+            if error.kind() == io::ErrorKind::NotFound {
+                self.miss(path);
+            }
+        })?;
         let name = path.display().to_string();
         let mut meshes = self.meshes.borrow_mut();
         if !meshes.iter().any(|(known, _)| *known == name) {

@@ -12,7 +12,7 @@ use crate::map;
 use crate::mission::{self, Mission, PathSpec};
 use crate::pipeline::{Inputs, MapFile, TextFile};
 use crate::robot::spec;
-pub use disk::{Disk, Named};
+pub use disk::{Disk, Named, ReadFile};
 
 /// Everything a mission names, read from disk.
 ///
@@ -20,14 +20,18 @@ pub use disk::{Disk, Named};
 /// All that a reader finds wrong: missing files, bad YAML.
 pub fn read(mission_path: &Path) -> Result<(Inputs, Disk), Diagnostics> {
     let disk = Disk::default();
-    let inputs = read_with(mission_path, &disk, &|named| Ok(Some(named)))?;
+    let inputs = read_with(mission_path, &disk, &|_, named| Ok(Some(named)))?;
     Ok((inputs, disk))
 }
 
-/// Which map file to read, if any, where the mission means this one.
-type ChooseMap<'a> = &'a dyn Fn(PathBuf) -> Result<Option<PathBuf>, Diagnostics>;
+/// Which map file to read, if any, where this mission means that one.
+pub type ChooseMap<'a> = &'a dyn Fn(&Mission, PathBuf) -> Result<Option<PathBuf>, Diagnostics>;
 
-fn read_with(mission_path: &Path, disk: &Disk, choose_map: ChooseMap<'_>) -> Result<Inputs, Diagnostics> {
+/// The same through a disk of the caller's, with another map or none.
+///
+/// # Errors
+/// As [`read`], and those of `choose_map`.
+pub fn read_with(mission_path: &Path, disk: &Disk, choose_map: ChooseMap<'_>) -> Result<Inputs, Diagnostics> {
     let text = disk.text(mission_path, None)?;
     let mission = mission::parse(&text.name, &text.text)?;
     let folder = folder_of(mission_path);
@@ -37,7 +41,7 @@ fn read_with(mission_path: &Path, disk: &Disk, choose_map: ChooseMap<'_>) -> Res
     let map = match &mission.map {
         None => None,
         Some(spec) => {
-            let chosen = choose_map(tidy(&folder.join(&spec.file)));
+            let chosen = choose_map(&mission, tidy(&folder.join(&spec.file)));
             let map = chosen.and_then(|path| path.map(|path| read_map(&path, &mission, disk)).transpose());
             map.map_err(|d| faults.extend(d.0)).ok().flatten()
         }
@@ -110,6 +114,7 @@ pub fn read_map_file(path: &Path, disk: &Disk, named_by: Option<&crate::diag::Sp
                 })?;
                 Some((other.display().to_string(), bytes))
             } else {
+                disk.miss(&other);
                 None
             }
         }

@@ -46,7 +46,7 @@ pub fn check(inputs: &Inputs, world: &World, table: &CommandTable) -> Result<Cer
         start_joints.map(|(j, own)| asked.and_then(|p| p.joints.get(&j.name).copied()).unwrap_or(*own)).collect();
     let goal = goal(mission, robot, given.as_ref().map(end_of));
     let task = Task { start, start_joints, goal, clearance: mission.clearance, reverse: mission.reverse };
-    Ok(certify::certify(table, robot, map.as_ref(), &task))
+    Ok(certify::certify(table, robot, map.as_deref(), &task))
 }
 
 /// The path error of commands as they are written: their replay against the mission's given path, or, where the path was

@@ -26,7 +26,7 @@ pub fn world(inputs: &mut Inputs) -> Result<World, Diagnostics> {
         (Some(spec), Some(file)) => {
             let beside = file.beside.as_ref().map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
             let inputs = MapInputs { name: &file.name, bytes: &file.bytes, beside };
-            Some(map::parse(&inputs, spec, robot.top_over_all_postures())?)
+            Some(map::parse(&inputs, spec, robot.top_over_all_postures())?.into())
         }
         _ => None,
     };

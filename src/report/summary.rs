@@ -263,7 +263,7 @@ fn degrees(radians: f64) -> String {
 }
 
 /// Four significant digits, no trailing zeros, no exponent.
-fn figure(value: f64) -> String {
+pub fn figure(value: f64) -> String {
     significant(value, 4)
 }
 

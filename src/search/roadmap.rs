@@ -17,7 +17,7 @@ const STEP_TIME: f64 = 0.12;
 struct Size {
     /// Postures that are looked at for those in which the robot is folded up.
     surveyed: usize,
-    /// Folded postures, and others.
+    /// Narrow and low postures each, and others.
     folded: usize,
     spread: usize,
     /// Postures for an end that leaves joints open.
@@ -30,11 +30,12 @@ struct Size {
 
 /// Enough for most, and enough for nearly all.
 const SIZES: [Size; 2] = [
-    Size { surveyed: 64, folded: 5, spread: 3, open: 4, ways: [2, 1], most: FEW_POSTURES },
-    Size { surveyed: 192, folded: 6, spread: 18, open: 6, ways: [6, 2], most: MOST_POSTURES },
+    Size { surveyed: 64, folded: 3, spread: 3, open: 4, ways: [2, 1], most: FEW_POSTURES },
+    Size { surveyed: 192, folded: 5, spread: 16, open: 6, ways: [6, 2], most: MOST_POSTURES },
 ];
-/// What a metre of height is worth in metres of width, of a folded robot.
-const HEIGHT: f64 = 0.3;
+/// What a metre of height is worth in metres of width, of a folded robot: some are narrow, to pass between things, some low, to pass
+/// under them.
+const HEIGHTS: [f64; 2] = [0.3, 3.0];
 /// Steps of the descent towards a folded posture, shares of the joints' ranges.
 const DESCENT: [f64; 4] = [0.12, 0.06, 0.03, 0.015];
 
@@ -110,7 +111,7 @@ impl Builder<'_> {
     }
 
     /// How wide and tall the robot's moving parts are, m.
-    fn extent(&self, q: &[f64]) -> f64 {
+    fn extent(&self, q: &[f64], height: f64) -> f64 {
         let poses = self.robot.shape_poses(q);
         let of = |s: &usize| {
             let (pose, convex) = (&poses[*s], &self.robot.shapes[*s].convex);
@@ -125,7 +126,7 @@ impl Builder<'_> {
             (wide, top)
         };
         let (wide, top) = self.moved.iter().map(of).fold((0.0f64, 0.0f64), |a, b| (a.0.max(b.0), a.1.max(b.1)));
-        wide + HEIGHT * top
+        wide + height * top
     }
 
     fn sample(&self, index: usize) -> Vec<f64> {
@@ -133,37 +134,32 @@ impl Builder<'_> {
         self.ranges.iter().enumerate().map(value).collect()
     }
 
-    /// Postures in which the robot is folded up, and how many; behind them such as lie far apart.
+    /// Postures in which the robot is folded up, and how many, the narrowest first; behind them such as lie far apart.
     fn folded_and_spread(&self) -> (usize, Vec<Vec<f64>>) {
         let Size { surveyed: count, folded, spread, .. } = *self.size;
-        let mut surveyed: Vec<(f64, Vec<f64>)> = (1..=count)
-            .map(|index| {
-                let q = self.sample(index);
-                (self.extent(&q), q)
-            })
-            .collect();
-        surveyed.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut keys: Vec<Vec<f64>> = Vec::new();
+        let surveyed: Vec<Vec<f64>> = (1..=count).map(|index| self.sample(index)).collect();
         let mut rest: Vec<f64> = vec![0.0; self.ranges.len()];
         rest.iter_mut().zip(&self.ranges).for_each(|(v, [low, high])| *v = v.clamp(*low, *high));
-        let seeds = std::iter::once(&rest).chain(surveyed.iter().map(|(_, q)| q));
-        for seed in seeds {
-            if keys.len() == folded {
-                break;
-            }
-            if self.touches(seed) {
-                continue;
-            }
-            let folded = self.fold(seed.clone());
-            if keys.iter().all(|key| self.time(key, &folded) > 4.0 * STEP_TIME) {
-                keys.push(folded);
+        let mut keys: Vec<Vec<f64>> = Vec::new();
+        for (kind, height) in HEIGHTS.into_iter().enumerate() {
+            for seed in std::iter::once(&rest).chain(self.by_extent(&surveyed, height)) {
+                if keys.len() == (kind + 1) * folded {
+                    break;
+                }
+                if self.touches(seed) {
+                    continue;
+                }
+                let folded = self.fold(seed.clone(), height);
+                if keys.iter().all(|key| self.time(key, &folded) > 4.0 * STEP_TIME) {
+                    keys.push(folded);
+                }
             }
         }
-        // The most folded one first.
-        keys.sort_by(|a, b| self.extent(a).total_cmp(&self.extent(b)));
+        keys.sort_by(|a, b| self.extent(a, HEIGHTS[0]).total_cmp(&self.extent(b, HEIGHTS[0])));
         let folded = keys.len();
         // The smaller half, each time the one farthest from all there are.
-        let mut left: Vec<&Vec<f64>> = surveyed[..count / 2].iter().map(|(_, q)| q).collect();
+        let mut left = self.by_extent(&surveyed, HEIGHTS[0]);
+        left.truncate(count / 2);
         while keys.len() < folded + spread && !left.is_empty() {
             let apart = |q: &[f64]| keys.iter().map(|key| self.time(key, q)).fold(f64::INFINITY, f64::min);
             let farthest = (0..left.len()).max_by(|a, b| apart(left[*a]).total_cmp(&apart(left[*b]))).unwrap_or(0);
@@ -175,9 +171,16 @@ impl Builder<'_> {
         (folded, keys)
     }
 
+    /// The smallest first.
+    fn by_extent<'b>(&self, postures: &'b [Vec<f64>], height: f64) -> Vec<&'b Vec<f64>> {
+        let mut sized: Vec<(f64, &Vec<f64>)> = postures.iter().map(|q| (self.extent(q, height), q)).collect();
+        sized.sort_by(|a, b| a.0.total_cmp(&b.0));
+        sized.into_iter().map(|(_, q)| q).collect()
+    }
+
     /// A posture nearby, no part of which reaches as far.
-    fn fold(&self, mut q: Vec<f64>) -> Vec<f64> {
-        let mut size = self.extent(&q);
+    fn fold(&self, mut q: Vec<f64>, height: f64) -> Vec<f64> {
+        let mut size = self.extent(&q, height);
         for share in DESCENT {
             let mut gained = true;
             while gained {
@@ -187,7 +190,7 @@ impl Builder<'_> {
                     for step in [share, -share] {
                         let before = q[joint];
                         q[joint] = (before + step * (high - low)).clamp(low, high);
-                        let found = self.extent(&q);
+                        let found = self.extent(&q, height);
                         if found < size - 1e-3 && !self.touches(&q) {
                             (size, gained) = (found, true);
                             break;

@@ -36,7 +36,7 @@ fn a_mission_that_is_cut_keeps_its_limits_and_its_clearance() {
                 clearance: inputs.mission.clearance - ASIDE,
                 reverse: inputs.mission.reverse,
             };
-            let certificate = certify(&cut, &compiled.robot, world.map.as_ref(), &task);
+            let certificate = certify(&cut, &compiled.robot, world.map.as_deref(), &task);
             assert!(certificate.holds(), "{name}, cut at row {at}: {:?}", certificate.refusals);
         }
     }
