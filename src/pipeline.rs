@@ -77,11 +77,16 @@ pub struct CompileOptions {
     pub spins: bool,
     /// Also find the largest sampling time with which commands leave the path by no more than this, m. Default: no.
     pub max_error: Option<f64>,
+    /// Threads for the distance field of a large map; the result is the same with any number. Default 1.
+    pub threads: usize,
 }
+
+/// Cells from which on a map's distance field is worth more than one thread.
+const LARGE_MAP: usize = 20_000_000;
 
 impl Default for CompileOptions {
     fn default() -> Self {
-        Self { sampling_time: None, parameterisation: None, dense: true, spins: true, max_error: None }
+        Self { sampling_time: None, parameterisation: None, dense: true, spins: true, max_error: None, threads: 1 }
     }
 }
 
@@ -271,7 +276,8 @@ enum Look {
 fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &VoxelMap, compile: &CompileOptions) -> Result<Made, Diagnostics> {
     let asked = compile.parameterisation.unwrap_or(finish.mission.parameterisation);
     let (mission, robot) = (finish.mission, finish.robot);
-    let field = run.stage("esdf", || esdf::build(map));
+    let threads = if map.dims.iter().product::<usize>() < LARGE_MAP { 1 } else { compile.threads };
+    let field = run.stage("esdf", || esdf::build_in_threads(map, threads));
     let query = query(mission, robot);
     let found = run.stage("search", || {
         let options = |margin: f64| SearchOptions { clearance: mission.clearance + margin, reverse: mission.reverse };

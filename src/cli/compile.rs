@@ -119,7 +119,8 @@ fn run(args: &CompileArgs, name: &str, terminal: &mut Terminal) -> Result<u8, Di
     let (mut inputs, disk) = inputs::read(&args.mission)?;
     let read = started.elapsed().as_secs_f64() * 1e3;
     let progress = terminal.progress(name);
-    let options = CompileOptions { sampling_time: args.sampling_time, ..Default::default() };
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let options = CompileOptions { sampling_time: args.sampling_time, threads, ..Default::default() };
     let outcome = pipeline::compile(&mut inputs, &options, &mut |stage| progress.stage(stage));
     drop(progress);
     if let Some(diagnostics) = outcome.diagnostics.as_ref().filter(|d| d.severity() == Severity::BadInput) {

@@ -35,7 +35,8 @@ pub(super) fn signed_distance(map: &VoxelMap, nodes: [usize; 3], threads: usize)
     // The slabs of each share, from the last one on, and what the pass backwards brings into it.
     let work = |share: &Range<usize>, slabs: &mut [f32], after: Option<Vec<f32>>| {
         let mut inner = Slabs::new(map, parts.clone());
-        let mut after = after.unwrap_or_else(|| slabs[slabs.len() - size..].iter().map(|steps| steps * NEVER).collect());
+        let mut after =
+            after.unwrap_or_else(|| slabs[slabs.len() - size..].iter().map(|steps| steps * NEVER).collect());
         for (i, slab) in share.clone().zip(slabs.chunks_exact_mut(size)).rev() {
             if i + 1 < nx {
                 step_back(slab, &mut after);
@@ -98,7 +99,8 @@ struct Forwards {
 /// Steps forwards, into `values`.
 fn sweep_forwards(map: &VoxelMap, parts: &Parts, shares: &[Range<usize>], values: &mut [f32]) -> Vec<Forwards> {
     let size = parts.range(parts.along_y.len() - 1).end;
-    let mut columns: Vec<Vec<&mut [f32]>> = parts.along_y.iter().map(|_| Vec::with_capacity(values.len() / size)).collect();
+    let mut columns: Vec<Vec<&mut [f32]>> =
+        parts.along_y.iter().map(|_| Vec::with_capacity(values.len() / size)).collect();
     for slab in values.chunks_exact_mut(size) {
         let mut rest = slab;
         for (p, column) in columns.iter_mut().enumerate() {

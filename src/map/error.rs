@@ -68,7 +68,9 @@ pub(super) enum MapError {
     )]
     TreeCut { at: usize, needs: usize, have: usize, seen: u64, promised: u64 },
     /// An octree with other nodes than its header promises, or with something behind it.
-    #[error("the tree ends at byte {at} of the file with {have} nodes and {left} bytes left over, but its header promises {promised} nodes")]
+    #[error(
+        "the tree ends at byte {at} of the file with {have} nodes and {left} bytes left over, but its header promises {promised} nodes"
+    )]
     NodesDiffer { at: usize, promised: u64, have: u64, left: usize },
     /// Nodes below the smallest cell.
     #[error("the node at byte {at} of the file has children below level {depth}, the last of an octree")]

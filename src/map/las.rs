@@ -198,7 +198,8 @@ mod packed {
 
     /// The table of chunks, where there is one, has no more entries than the file has bytes: memory is taken for as many as it says.
     fn check_chunks(bytes: &[u8], header: &Header) -> Result<(), MapError> {
-        let long = |at: usize| bytes.get(at..at.checked_add(8)?).map(|b| u64::from_le_bytes(b.try_into().expect("eight")));
+        let long =
+            |at: usize| bytes.get(at..at.checked_add(8)?).map(|b| u64::from_le_bytes(b.try_into().expect("eight")));
         let ends = [long(header.start), long(bytes.len().saturating_sub(8))];
         for table in ends.into_iter().flatten().filter_map(|at| usize::try_from(at).ok()) {
             let count = bytes.get(table.saturating_add(4)..table.saturating_add(8));

@@ -13,6 +13,7 @@ mod pcd;
 mod pgm;
 mod ply;
 mod points;
+mod survey;
 #[cfg(test)]
 mod tests;
 mod text;
@@ -26,6 +27,7 @@ use crate::geom::Aabb;
 use crate::mission::{MapSpec, Unknown};
 
 use error::MapError;
+pub use survey::{Floor, Survey, survey};
 use voxelize::Slab;
 
 /// Cell size of point clouds where the mission gives none, m.

@@ -220,7 +220,9 @@ impl Octree<'_> {
                 seen += 1;
                 let child = node.child(number);
                 match state {
-                    3 if child.depth >= DEPTH => return Err(MapError::TooDeep { at: self.begin + at - 2, depth: DEPTH }),
+                    3 if child.depth >= DEPTH => {
+                        return Err(MapError::TooDeep { at: self.begin + at - 2, depth: DEPTH });
+                    }
                     3 => pending.push(child),
                     _ => f(child.leaf(state == 2)),
                 }
@@ -276,6 +278,16 @@ impl Octree<'_> {
         Ok(map)
     }
 
+    /// Centres of the occupied cells at any height, of the tree's own size.
+    pub(super) fn centres(&self, slab: Slab) -> Result<Vec<[f64; 3]>, MapError> {
+        let map = self.own_cells(slab, Unknown::Free)?;
+        let centre = |cell| {
+            let cube = map.cube(cell);
+            [0, 1, 2].map(|a| 0.5 * (cube.min[a] + cube.max[a]))
+        };
+        Ok(map.cells().map(centre).collect())
+    }
+
     /// Cells of the tree's own size. The grid is the box around all leaves, cut to the slab.
     fn own_cells(&self, slab: Slab, unknown: Unknown) -> Result<VoxelMap, MapError> {
         let [low, high] = self.bounds;
@@ -293,12 +305,15 @@ impl Octree<'_> {
             None => (low[2], low[2] + 1),
         };
         let corner = [low[0], low[1], bottom];
-        let dims = voxelize::checked([high[0] - low[0], high[1] - low[1], top - bottom].map(i64::from), self.resolution)
-            .map_err(|fault| match fault {
-                // Other cells would be made of these, so asking for larger ones is no help.
-                MapError::TooLarge { dims, resolution, .. } => MapError::TooLarge { dims, resolution, enough: None },
-                other => other,
-            })?;
+        let dims =
+            voxelize::checked([high[0] - low[0], high[1] - low[1], top - bottom].map(i64::from), self.resolution)
+                .map_err(|fault| match fault {
+                    // Other cells would be made of these, so asking for larger ones is no help.
+                    MapError::TooLarge { dims, resolution, .. } => {
+                        MapError::TooLarge { dims, resolution, enough: None }
+                    }
+                    other => other,
+                })?;
         let mut map = VoxelMap::new(self.resolution, corner.map(side), dims, unknown);
         let mut statistics = MapStatistics::default();
         if first.is_none() {

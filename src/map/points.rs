@@ -89,7 +89,9 @@ impl Points<'_> {
             Self::List(list) => list.iter().for_each(|p| f(*p)),
             Self::Scaled { records, stride, count, scale, offset } => {
                 for record in records.chunks_exact(*stride).take(*count) {
-                    let steps = |a: usize| f64::from(i32::from_le_bytes(record[4 * a..4 * a + 4].try_into().expect("four bytes")));
+                    let steps = |a: usize| {
+                        f64::from(i32::from_le_bytes(record[4 * a..4 * a + 4].try_into().expect("four bytes")))
+                    };
                     f([0, 1, 2].map(|a| steps(a) * scale[a] + offset[a]));
                 }
             }

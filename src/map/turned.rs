@@ -70,7 +70,8 @@ fn askew(sheet: &Sheet, yaw: f64) -> (Sheet, [f64; 2]) {
     for (at, seen) in sheet.cells.iter().enumerate().filter(|(_, seen)| **seen != Seen::Free) {
         let centre = turned((at % sheet.width) as f64 + 0.5, (at / sheet.width) as f64 + 0.5);
         let first = [0, 1].map(|a| (centre[a] - half - low[a]).floor().max(0.0) as usize);
-        let last = [(0, width), (1, height)].map(|(a, n)| ((centre[a] + half - low[a]).ceil().max(0.0) as usize).min(n));
+        let last =
+            [(0, width), (1, height)].map(|(a, n)| ((centre[a] + half - low[a]).ceil().max(0.0) as usize).min(n));
         for (i, j) in (first[0]..last[0]).flat_map(|i| (first[1]..last[1]).map(move |j| (i, j))) {
             let d = [low[0] + i as f64 + 0.5 - centre[0], low[1] + j as f64 + 0.5 - centre[1]];
             let shadows = [d[0], d[1], cos * d[0] + sin * d[1], cos * d[1] - sin * d[0]];

@@ -12,9 +12,7 @@ fn with_header(from: &str, to: &str) -> Vec<u8> {
 
 #[test]
 fn other_formats_are_named_with_what_is_read() {
-    for (name, word) in
-        [("a.e57", ".las"), ("a.stl", ".ply"), ("a", ".csv")]
-    {
+    for (name, word) in [("a.e57", ".las"), ("a.stl", ".ply"), ("a", ".csv")] {
         let d = parse(&inputs(name, b""), &spec([0.0, 1.0]), 1.0).expect_err(name);
         assert_eq!(d.0[0].code, "map/format");
         assert!(d.0[0].hint.as_ref().is_some_and(|h| h.contains(word)), "{d:?}");

@@ -162,7 +162,8 @@ mod packed {
             for value in [0, 1, 0x7f, 0xff] {
                 let mut changed = file.clone();
                 changed[at] = value;
-                let _ = parse(&inputs("a.laz", &changed), &MapSpec { resolution: Some(100.0), ..spec([-1.0, 1.0]) }, 1.0);
+                let _ =
+                    parse(&inputs("a.laz", &changed), &MapSpec { resolution: Some(100.0), ..spec([-1.0, 1.0]) }, 1.0);
             }
         }
     }
