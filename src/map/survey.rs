@@ -15,6 +15,8 @@ const COLUMN: f64 = 0.5;
 const MOST_COLUMNS: usize = 400;
 /// A column belongs to the floor whose lowest point is as near to the plane as this, m.
 const NEAR: f64 = 0.05;
+/// What is steeper is no floor that anybody drives on, rad: 20 degrees.
+const STEEPEST: f64 = 0.35;
 /// Tolerances of the fits, one after the other, m: the first is to leave out what is no floor at all.
 const TOLERANCES: [f64; 8] = [0.4, 0.4, 0.2, 0.2, 0.1, 0.1, NEAR, NEAR];
 
@@ -134,7 +136,8 @@ fn floor(columns: &[[f64; 3]]) -> Option<Floor> {
         plane = solved.map_or(plane, |s| [s[0], s[1], s[2]]);
     }
     let share = columns.iter().filter(|c| near(&plane, c, NEAR)).count() as f64 / columns.len() as f64;
-    (share > 0.0).then_some(Floor { level: plane[0], slope: [plane[1], plane[2]], share })
+    let floor = Floor { level: plane[0], slope: [plane[1], plane[2]], share };
+    (share > 0.0 && floor.tilt() <= STEEPEST).then_some(floor)
 }
 
 impl Survey {
@@ -144,10 +147,9 @@ impl Survey {
         let range = |a: usize| format!("{:.3} to {:.3}", low[a], high[a]);
         let mut out = format!("{:<12}x {} m, y {} m, z {} m\n", "measured", range(0), range(1), range(2));
         let floor = match &self.floor {
-            // Shorter than what a threshold rises.
             Some(f) if f.share >= 0.3 => format!(
                 "about z {:.3} m in the middle, tilted by {:.2} deg; {:.0} % of the ground within {NEAR} m of that",
-                f.level,
+                (f.level * 1e3).round() / 1e3 + 0.0,
                 f.tilt().to_degrees(),
                 100.0 * f.share
             ),

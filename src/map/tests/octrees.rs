@@ -208,7 +208,10 @@ fn what_is_wrong_with_a_tree_is_said_with_its_place() {
 
 fn node(depth: u32) -> impl Strategy<Value = Node> {
     let leaf = prop_oneof![2 => Just(Unseen), 1 => Just(Leaf(true)), 2 => Just(Leaf(false))];
-    leaf.prop_recursive(depth, 64, 8, |inner| prop::collection::vec(inner, 8).prop_map(Inner))
+    // No inner node without children: of records that is what a leaf is.
+    let inner =
+        |children: Vec<Node>| if children.iter().all(|c| c.count() == 0) { Leaf(false) } else { Inner(children) };
+    leaf.prop_recursive(depth, 64, 8, move |below| prop::collection::vec(below, 8).prop_map(inner))
 }
 
 /// State of each cell by going down the tree; `low` in cells.
