@@ -31,8 +31,8 @@ impl Columns {
                 *row = block(slab, k * self.stride + at);
             }
             self.live.clear();
-            for k in 0..nz {
-                if repeats[k] && self.live.last() == Some(&(k - 1)) {
+            for (k, repeats) in repeats.iter().enumerate() {
+                if *repeats && self.live.last() == Some(&(k - 1)) {
                     self.live.pop();
                 }
                 let own = self.before[k];

@@ -113,8 +113,8 @@ fn sweep_forwards(map: &VoxelMap, parts: &Parts, shares: &[Range<usize>], values
         let (along_y, nz) = (parts.along_y[p].clone(), parts.nz);
         let (ny, mut kinds) = (along_y.len(), Kinds::new(along_y, nz));
         let mut solids = vec![false; slabs.len()];
-        for i in 0..slabs.len() {
-            solids[i] = kinds.read(map, i);
+        for (i, solid) in solids.iter_mut().enumerate() {
+            *solid = kinds.read(map, i);
             let (done, slab) = slabs.split_at_mut(i);
             for k in 0..nz {
                 let row = k * ny..(k + 1) * ny;
