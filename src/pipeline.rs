@@ -78,11 +78,13 @@ pub struct CompileOptions {
     pub spins: bool,
     /// Also find the largest sampling time with which commands leave the path by no more than this, m. Default: no.
     pub max_error: Option<f64>,
+    /// Threads for the distance field of a large map; the result is the same with any number. Default 1.
+    pub threads: usize,
 }
 
 impl Default for CompileOptions {
     fn default() -> Self {
-        Self { sampling_time: None, parameterisation: None, dense: true, spins: true, max_error: None }
+        Self { sampling_time: None, parameterisation: None, dense: true, spins: true, max_error: None, threads: 1 }
     }
 }
 
@@ -299,7 +301,7 @@ enum Look {
 fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &Place, compile: &CompileOptions) -> Result<Made, Diagnostics> {
     let asked = compile.parameterisation.unwrap_or(finish.mission.parameterisation);
     let (mission, robot) = (finish.mission, finish.robot);
-    let field = run.stage("esdf", || map.field());
+    let field = run.stage("esdf", || map.field(compile.threads));
     let query = query(mission, robot);
     let found = run.stage("search", || {
         let options = |margin: f64| SearchOptions { clearance: mission.clearance + margin, reverse: mission.reverse };

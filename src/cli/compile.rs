@@ -7,7 +7,7 @@ use super::output;
 use super::products::{ProductArgs, Products, publish};
 use super::terminal::Terminal;
 use crate::diag::{Diagnostic, Diagnostics, Severity};
-use crate::pipeline;
+use crate::pipeline::{self, CompileOptions};
 use crate::report::summary;
 
 /// Compile one mission into certified command files.
@@ -64,7 +64,9 @@ fn run(args: &CompileArgs, name: &str, terminal: &mut Terminal) -> Result<u8, Di
     let (mut inputs, disk) = inputs::read(&args.mission)?;
     let read = started.elapsed().as_secs_f64() * 1e3;
     let progress = terminal.progress(name);
-    let outcome = pipeline::compile(&mut inputs, &args.products.options(), &mut |stage| progress.stage(stage));
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let options = CompileOptions { threads, ..args.products.options() };
+    let outcome = pipeline::compile(&mut inputs, &options, &mut |stage| progress.stage(stage));
     drop(progress);
     if let Some(diagnostics) = outcome.diagnostics.as_ref().filter(|d| d.severity() == Severity::BadInput) {
         return Err(diagnostics.clone());

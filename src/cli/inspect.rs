@@ -24,9 +24,9 @@ use crate::robot::{self, RobotInputs};
 pub struct InspectArgs {
     /// .urdf, robot.yaml, a mission, a map, commands.csv or commands.mcap.
     file: PathBuf,
-    /// Cell size of point clouds, in metres.
-    #[arg(long, value_name = "M", default_value_t = 0.05)]
-    resolution: f64,
+    /// Cell size, in metres [default: 0.05 of point clouds; grids have their own]
+    #[arg(long, value_name = "M")]
+    resolution: Option<f64>,
     /// Slab of a map that holds obstacles, in metres.
     #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', allow_hyphen_values = true, default_values_t = [0.02, 2.0])]
     height: Vec<f64>,
@@ -125,19 +125,26 @@ fn of_map(args: &InspectArgs, path: &Path) -> Result<Understood, Diagnostics> {
         }
     };
     let file = read_map_file(path, &Disk::default(), None)?;
-    let points =
-        !["yaml", "yml", "npy"].iter().any(|e| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(e)));
     let spec = MapSpec {
         file: path.to_path_buf(),
-        resolution: points.then_some(args.resolution),
+        resolution: args.resolution,
         height: Some(height),
         unknown: Unknown::Occupied,
         origin: None,
     };
     let beside = file.beside.as_ref().map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
-    let map = map::parse(&MapInputs { name: &file.name, bytes: &file.bytes, beside }, &spec, height[1])?;
-    let json = json!(MapPart::from(&map));
-    Ok(Understood { text: map.describe(), json, figure: plot::map(&file.name, &map) })
+    let inputs = MapInputs { name: &file.name, bytes: &file.bytes, beside };
+    let map = map::parse(&inputs, &spec, height[1])?;
+    let survey = map::survey(&inputs)?;
+    let mut json = json!(MapPart::from(&map));
+    if let Some(survey) = &survey {
+        json["measured"] = json!({"low_m": survey.bounds[0], "high_m": survey.bounds[1], "heights": survey.heights});
+        json["floor"] = json!(survey.floor.map(|floor| {
+            json!({"z_m": floor.level, "tilt_rad": floor.tilt(), "slope": floor.slope, "share": floor.share})
+        }));
+    }
+    let measured = survey.map_or(String::new(), |survey| survey.describe() + "\n");
+    Ok(Understood { text: measured + &map.describe(), json, figure: plot::map(&file.name, &map) })
 }
 
 fn of_mission(path: &Path) -> Result<Understood, Diagnostics> {

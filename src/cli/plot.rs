@@ -30,9 +30,16 @@ pub(super) fn robot(robot: &RobotModel) -> Figure {
     figure(format!("Robot {}", robot.name), view)
 }
 
-/// A map from above.
+/// A map from above, by height, and slices at a sixth, half and five sixths of its obstacles' heights.
 pub(super) fn map(name: &str, map: &VoxelMap) -> Figure {
-    figure(format!("Map {name}"), TopView::of_map(map, f64::INFINITY))
+    let mut figure = figure(format!("Map {name}"), TopView::by_height(map));
+    let layers = map.dims[2];
+    let mut shown: Vec<usize> = [1, 3, 5].map(|sixth| layers * sixth / 6).to_vec();
+    shown.dedup();
+    if layers > 1 {
+        figure.panels.extend(shown.into_iter().map(|layer| Panel::Top(TopView::slice(map, layer))));
+    }
+    figure
 }
 
 /// Path error against sampling time, as \[CONV\] Fig. 16: a line for each sampling, with the bound if there is one (m).

@@ -1,24 +1,29 @@
 //! What the nodes of a slab are, from the bits of the map.
 
+use std::ops::Range;
+
 use crate::map::VoxelMap;
 use crate::mission::Unknown;
 
-/// What the nodes of one slab are: free (no cell around them occupied), inside a solid (all are), or on a surface.
+/// What the nodes of one slab, or of a part of it, are: free (no cell around them occupied), inside a solid (all are), or on a surface.
 pub(super) struct Kinds {
     /// 32 nodes a word: bit k % 32 of word (k / 32) * ny + j.
     site: Vec<u32>,
     solid: Vec<u32>,
+    /// First node along y, and how many: nodes of a part of the slab only.
+    first: usize,
     length: usize,
-    /// Of the cells of columns (i - 1, j) and (i, j): occupied in one of them, in both.
+    /// Of the cells of columns (i - 1, j) and (i, j): occupied in one of them, in both. Element 0 is the column before the first node.
     any: Vec<u64>,
     all: Vec<u64>,
 }
 
 impl Kinds {
-    pub(super) fn new([_, ny, nz]: [usize; 3]) -> Self {
-        let words = nz.div_ceil(64);
-        let (planes, pairs) = (vec![0; 2 * words * ny], vec![0; words * (ny + 1)]);
-        Self { site: planes.clone(), solid: planes, length: ny, any: pairs.clone(), all: pairs }
+    /// For slabs of nz nodes along z, and these along y.
+    pub(super) fn new(along_y: Range<usize>, nz: usize) -> Self {
+        let (words, length) = (nz.div_ceil(64), along_y.len());
+        let (planes, pairs) = (vec![0; 2 * words * length], vec![0; words * (length + 1)]);
+        Self { site: planes.clone(), solid: planes, first: along_y.start, length, any: pairs.clone(), all: pairs }
     }
 
     /// Reads slab i; whether it holds a node inside a solid. Beyond the grid is solid sideways where unknown space is an
@@ -31,8 +36,9 @@ impl Kinds {
         self.any.fill(0);
         self.all.fill(beyond);
         let cells = map.dims[2].div_ceil(64);
-        for j in 0..map.dims[1] {
-            let at = (j + 1) * words;
+        let columns = self.first.max(1) - 1..(self.first + ny).min(map.dims[1]);
+        for j in columns {
+            let at = (j + 1 - self.first) * words;
             let low = if i > 0 { map.column(i - 1, j) } else { &[] };
             let high = if i < map.dims[0] { map.column(i, j) } else { &[] };
             for w in 0..cells {

@@ -4,6 +4,8 @@
 //! nodes. Else the lower envelope of parabolas (Felzenszwalb & Huttenlocher 2012, cited by \[SCR\] as [22]), O(nodes) whatever
 //! the values.
 
+use super::columns::Columns;
+
 /// Squares from here on mean: no site.
 pub(super) const NONE: f32 = 1.0e14;
 /// Nodes handled together.
@@ -12,10 +14,10 @@ pub(super) const LANES: usize = 16;
 /// within `PAD`.
 const LOW: f32 = 64.0;
 const PAD: usize = 48;
-/// Columns higher than this take the envelope.
-const TALL: usize = 128;
+/// Columns of no more rows than this go through windows, higher ones through two sweeps.
+const LOW_RISE: usize = 32;
 
-type Block = [f32; LANES];
+pub(super) type Block = [f32; LANES];
 
 /// A parabola on the lower envelope.
 #[derive(Clone, Copy, Default)]
@@ -41,6 +43,9 @@ pub(super) struct Lines {
     /// Lowest value of each column.
     low: Vec<f32>,
     slab: Vec<f32>,
+    /// Whether a row equals the row below.
+    repeats: Vec<bool>,
+    high: Columns,
 }
 
 impl Lines {
@@ -56,6 +61,8 @@ impl Lines {
             line: vec![f32::MAX; longest.next_multiple_of(LANES) + 2 * PAD],
             low: vec![0.0; stride],
             slab: vec![0.0; stride * nz],
+            repeats: vec![false; nz],
+            high: Columns::new(stride, if nz > LOW_RISE { nz } else { 0 }),
         }
     }
 
@@ -66,7 +73,8 @@ impl Lines {
         for k in 0..nz {
             let (below, row) = slab.split_at_mut(k * self.stride);
             let row = &mut row[..ny];
-            if k > 0 && equal(row, &self.line[PAD..PAD + ny]) {
+            self.repeats[k] = k > 0 && equal(row, &self.line[PAD..PAD + ny]);
+            if self.repeats[k] {
                 row.copy_from_slice(&below[(k - 1) * self.stride..][..ny]);
                 continue;
             }
@@ -77,14 +85,10 @@ impl Lines {
                 self.envelope(row);
             }
         }
-        if nz <= TALL {
+        if nz <= LOW_RISE {
             self.columns(slab);
-            return;
-        }
-        for j in 0..ny {
-            let mut column: Vec<f32> = slab[j..].iter().step_by(self.stride).copied().collect();
-            self.envelope(&mut column);
-            slab[j..].iter_mut().step_by(self.stride).zip(&column).for_each(|(value, new)| *value = *new);
+        } else {
+            self.high.transform(slab, &self.repeats);
         }
     }
 
@@ -209,7 +213,7 @@ fn low_everywhere(row: &[f32]) -> bool {
 }
 
 #[inline]
-fn block(line: &[f32], at: usize) -> Block {
+pub(super) fn block(line: &[f32], at: usize) -> Block {
     line[at..at + LANES].try_into().expect("as long as a block")
 }
 

@@ -6,7 +6,13 @@
 //! over blocks. Those loops are functions that are never inlined: only so does the compiler know that their rows do not
 //! overlap, and takes four nodes at once.
 //!
+//! With several threads each has a part of every slab, by y, for the pass forwards, which goes through all slabs; and then some
+//! of the slabs, all of each. What the pass backwards has counted where a thread's slabs begin is found out in between, as that
+//! is again a matter of lines along x. Every node is computed as by one thread: the bytes are the same.
+//!
 //! Squared distances are whole numbers in f32: exact up to 4096 cells, within rounding beyond.
+
+use std::ops::Range;
 
 use super::FAR;
 use super::kinds::Kinds;
@@ -17,39 +23,136 @@ use crate::mission::Unknown;
 /// Steps of a node with no site on its line; one more is lost in rounding. (2^24; its square is above `NONE`.)
 const NEVER: f32 = 16_777_216.0;
 
-/// Signed distances (m) at all nodes.
-pub(super) fn signed_distance(map: &VoxelMap, nodes: [usize; 3]) -> Vec<f32> {
+/// Signed distances (m) at all nodes, by so many threads (at least 1).
+pub(super) fn signed_distance(map: &VoxelMap, nodes: [usize; 3], threads: usize) -> Vec<f32> {
     let [nx, ny, nz] = nodes;
     let size = ny * nz;
     let mut values = vec![0.0f32; nx * size];
-    let mut kinds = Kinds::new(nodes);
-    let mut solids = vec![false; nx];
-    for i in 0..nx {
-        solids[i] = kinds.read(map, i);
-        let (done, slab) = values.split_at_mut(i * size);
-        for k in 0..nz {
-            let row = &mut slab[k * ny..][..ny];
-            let before = if i == 0 { None } else { Some(&done[(i - 1) * size + k * ny..][..ny]) };
-            step(row, kinds.row(k), before);
+    let parts = Parts::new(ny, nz, threads);
+    let shares = shares(nx, threads, 1);
+    let forwards = sweep_forwards(map, &parts, &shares, &mut values);
+    let solids: Vec<bool> = (0..nx).map(|i| forwards.iter().any(|part| part.solids[i])).collect();
+    // The slabs of each share, from the last one on, and what the pass backwards brings into it.
+    let work = |share: &Range<usize>, slabs: &mut [f32], after: Option<Vec<f32>>| {
+        let mut inner = Slabs::new(map, parts.clone());
+        let mut after =
+            after.unwrap_or_else(|| slabs[slabs.len() - size..].iter().map(|steps| steps * NEVER).collect());
+        for (i, slab) in share.clone().zip(slabs.chunks_exact_mut(size)).rev() {
+            if i + 1 < nx {
+                step_back(slab, &mut after);
+            }
+            let edge = if map.outside == Unknown::Occupied { i.min(nx - 1 - i) as f32 } else { f32::INFINITY };
+            inner.outside(slab, &after, edge);
+            if solids[i] {
+                inner.inside(slab, &after);
+            }
+            inner.write(slab);
         }
-    }
-    let mut slabs = Slabs::new(map, [ny, nz]);
-    let mut after = vec![0.0; size];
-    for i in (0..nx).rev() {
-        let slab = &mut values[i * size..][..size];
-        if i + 1 == nx {
-            after.iter_mut().zip(&*slab).for_each(|(after, forwards)| *after = forwards * NEVER);
-        } else {
-            step_back(slab, &mut after);
-        }
-        let edge = if map.outside == Unknown::Occupied { i.min(nx - 1 - i) as f32 } else { f32::INFINITY };
-        slabs.outside(slab, &after, edge);
-        if solids[i] {
-            slabs.inside(slab, &after);
-        }
-        slabs.write(slab);
-    }
+    };
+    let after = |share: usize| {
+        (share + 1 < shares.len()).then(|| forwards.iter().flat_map(|part| part.after[share].iter().copied()).collect())
+    };
+    let mut rest = &mut values[..];
+    let tasks = shares.iter().enumerate().map(|(at, share)| {
+        let (own, others) = std::mem::take(&mut rest).split_at_mut(share.len() * size);
+        rest = others;
+        let (work, after) = (&work, after(at));
+        move || work(share, own, after)
+    });
+    each_in_a_thread(tasks.collect());
     values
+}
+
+/// Parts of slabs along y: part p holds nodes `along_y[p]`, row by row, where a slab of one part would hold them.
+#[derive(Clone)]
+struct Parts {
+    along_y: Vec<Range<usize>>,
+    nz: usize,
+}
+
+impl Parts {
+    fn new(ny: usize, nz: usize, threads: usize) -> Self {
+        Self { along_y: shares(ny, threads, LANES), nz }
+    }
+
+    /// Where in a slab part p lies.
+    fn range(&self, p: usize) -> Range<usize> {
+        self.along_y[p].start * self.nz..self.along_y[p].end * self.nz
+    }
+}
+
+/// Splits `0..n` evenly into at most `threads` ranges, which begin at whole multiples of `grain`; none is empty.
+fn shares(n: usize, threads: usize, grain: usize) -> Vec<Range<usize>> {
+    let threads = threads.clamp(1, n.div_ceil(grain).max(1));
+    let end = |t: usize| if t == threads { n } else { n * t / threads / grain * grain };
+    (0..threads).map(|t| end(t)..end(t + 1)).filter(|share| !share.is_empty()).collect()
+}
+
+/// What the pass forwards found in one part of all slabs.
+struct Forwards {
+    /// Whether a slab holds a node inside a solid there.
+    solids: Vec<bool>,
+    /// Of each share of slabs but the last: the steps backwards at the first slab behind it.
+    after: Vec<Vec<f32>>,
+}
+
+/// Steps forwards, into `values`.
+fn sweep_forwards(map: &VoxelMap, parts: &Parts, shares: &[Range<usize>], values: &mut [f32]) -> Vec<Forwards> {
+    let size = parts.range(parts.along_y.len() - 1).end;
+    let mut columns: Vec<Vec<&mut [f32]>> =
+        parts.along_y.iter().map(|_| Vec::with_capacity(values.len() / size)).collect();
+    for slab in values.chunks_exact_mut(size) {
+        let mut rest = slab;
+        for (p, column) in columns.iter_mut().enumerate() {
+            let (own, others) = rest.split_at_mut(parts.range(p).len());
+            column.push(own);
+            rest = others;
+        }
+    }
+    let sweep = |p: usize, mut slabs: Vec<&mut [f32]>| {
+        let (along_y, nz) = (parts.along_y[p].clone(), parts.nz);
+        let (ny, mut kinds) = (along_y.len(), Kinds::new(along_y, nz));
+        let mut solids = vec![false; slabs.len()];
+        for (i, solid) in solids.iter_mut().enumerate() {
+            *solid = kinds.read(map, i);
+            let (done, slab) = slabs.split_at_mut(i);
+            for k in 0..nz {
+                let row = k * ny..(k + 1) * ny;
+                step(&mut slab[0][row.clone()], kinds.row(k), done.last().map(|before| &before[row]));
+            }
+        }
+        let mut after = vec![Vec::new(); shares.len() - 1];
+        let first = shares.iter().map(|share| share.end).find(|end| *end < slabs.len());
+        if let Some(first) = first {
+            let mut steps: Vec<f32> = slabs[slabs.len() - 1].iter().map(|steps| steps * NEVER).collect();
+            for i in (first..slabs.len()).rev() {
+                if i + 1 < slabs.len() {
+                    step_back(slabs[i], &mut steps);
+                }
+                if let Some(share) = shares.iter().position(|share| share.end == i) {
+                    after[share].clone_from(&steps);
+                }
+            }
+        }
+        Forwards { solids, after }
+    };
+    let tasks = columns.into_iter().enumerate().map(|(p, slabs)| move || sweep(p, slabs));
+    each_in_a_thread(tasks.collect())
+}
+
+/// Runs all, the first one here; their results in order.
+fn each_in_a_thread<T: Send>(tasks: Vec<impl FnOnce() -> T + Send>) -> Vec<T> {
+    std::thread::scope(|scope| {
+        let mut tasks = tasks.into_iter();
+        let here = tasks.next();
+        let others: Vec<_> = tasks.map(|task| scope.spawn(task)).collect();
+        let first = here.map(|task| task());
+        let join = |other: std::thread::ScopedJoinHandle<'_, T>| match other.join() {
+            Ok(result) => result,
+            Err(panic) => std::panic::resume_unwind(panic),
+        };
+        first.into_iter().chain(others.into_iter().map(join)).collect()
+    })
 }
 
 /// Steps since the last node of another kind, signed: > 0 for free nodes, < 0 for nodes inside, 0 on surfaces.
@@ -79,6 +182,7 @@ fn step_back(forwards: &[f32], after: &mut [f32]) {
 /// The passes along y and z, and their memory.
 struct Slabs {
     lines: Lines,
+    parts: Parts,
     size: [usize; 2],
     stride: usize,
     resolution: f32,
@@ -91,7 +195,8 @@ struct Slabs {
 }
 
 impl Slabs {
-    fn new(map: &VoxelMap, [ny, nz]: [usize; 2]) -> Self {
+    fn new(map: &VoxelMap, parts: Parts) -> Self {
+        let (ny, nz) = (map.dims[1] + 1, parts.nz);
         let stride = ny.next_multiple_of(LANES);
         // Infinite where the edge is no wall.
         let walled = map.outside == Unknown::Occupied;
@@ -101,6 +206,7 @@ impl Slabs {
         let metres = squares.clone();
         Self {
             lines: Lines::new([ny, nz]),
+            parts,
             size: [ny, nz],
             stride,
             resolution: map.resolution as f32,
@@ -131,10 +237,12 @@ impl Slabs {
 
     /// Squared distance along x for the nodes whose steps have this sign, 0 for all others.
     fn squares(&mut self, forwards: &[f32], after: &[f32], sign: f32) {
-        let ny = self.size[0];
-        let steps = forwards.chunks_exact(ny).zip(after.chunks_exact(ny));
-        for (row, (forwards, after)) in self.squares.chunks_exact_mut(self.stride).zip(steps) {
-            nearest(&mut row[..ny], forwards, after, sign);
+        for (p, along_y) in self.parts.along_y.iter().enumerate() {
+            let (part, length) = (self.parts.range(p), along_y.len());
+            let steps = forwards[part.clone()].chunks_exact(length).zip(after[part].chunks_exact(length));
+            for (row, (forwards, after)) in self.squares.chunks_exact_mut(self.stride).zip(steps) {
+                nearest(&mut row[along_y.clone()], forwards, after, sign);
+            }
         }
     }
 

@@ -36,7 +36,11 @@ impl VoxelMap {
             line("cut", format!("{} outside height_m", s.cut));
         }
         if s.unknown > 0 {
-            line("unknown", format!("{} cells count as obstacles only because they are unknown", s.unknown));
+            let share = 100.0 * s.unknown as f64 / (nx * ny * nz) as f64;
+            line(
+                "unknown",
+                format!("{} cells ({share:.1} %) count as obstacles only because they are unknown", s.unknown),
+            );
         }
         out + "\n" + &self.top_view()
     }

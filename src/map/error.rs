@@ -3,8 +3,8 @@
 use crate::diag::{Describe, Diagnostic, Span};
 
 /// Endings that are read, for messages.
-pub(super) const FORMATS: &str = "point clouds .pcd, .ply, .xyz, .txt, .csv and .npy (N x 3); voxels .npy (3-D, boolean or \
-                                  integer); map_server .yaml with its .pgm";
+pub(super) const FORMATS: &str = "point clouds .pcd, .ply, .las, .laz, .xyz, .txt, .csv and .npy (N x 3); voxels .npy (3-D, boolean or \
+                                  integer); octrees .bt and .ot; map_server .yaml with its .pgm";
 
 /// Why a map cannot be read. The top of the stage adds the file's name where a variant has no place in a text.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -62,6 +62,35 @@ pub(super) enum MapError {
     /// A row that may have decimal commas.
     #[error("line {line} has both commas and semicolons: `{text}`")]
     MixedSeparators { line: u64, text: String },
+    /// An octree that ends within a node.
+    #[error(
+        "the tree is cut off at byte {at} of the file: a node needs {needs} bytes, {have} are left; {seen} of {promised} nodes read"
+    )]
+    TreeCut { at: usize, needs: usize, have: usize, seen: u64, promised: u64 },
+    /// An octree with other nodes than its header promises, or with something behind it.
+    #[error(
+        "the tree ends at byte {at} of the file with {have} nodes and {left} bytes left over, but its header promises {promised} nodes"
+    )]
+    NodesDiffer { at: usize, promised: u64, have: u64, left: usize },
+    /// Nodes below the smallest cell.
+    #[error("the node at byte {at} of the file has children below level {depth}, the last of an octree")]
+    TooDeep { at: usize, depth: u32 },
+    /// A node's log-odds are no number.
+    #[error("the node at byte {at} of the file has no occupancy: its log-odds are NaN")]
+    NoOccupancy { at: usize },
+    /// An octree without known space.
+    #[error("no leaves: the octree is empty")]
+    NoLeaves,
+    /// A value of a LAS header that makes no sense.
+    #[error("byte {at} of the LAS header: {what} is {found}, expected {expected}")]
+    LasHeader { at: usize, what: &'static str, found: String, expected: String },
+    /// LAZ, which this build does not unpack.
+    #[error("the LAS file is compressed (LAZ), which this build does not unpack")]
+    LazNotBuilt,
+    /// LAZ that does not decode.
+    #[cfg(feature = "laz")]
+    #[error("the compressed points are damaged after {at} of {points}: {fault}")]
+    LazDamaged { at: u64, points: u64, fault: String },
     /// Compressed data that does not decode.
     #[error("the compressed data is damaged at its byte {at}: {unpacked} of {expected} bytes unpacked")]
     Damaged { at: usize, unpacked: usize, expected: usize },
@@ -76,7 +105,7 @@ pub(super) enum MapError {
     FarAway { value: f64, axis: char, limit: f64 },
     /// The grid would not fit in memory.
     #[error("the grid would have {} x {} x {} cells of {resolution} m: more than can be handled", dims[0], dims[1], dims[2])]
-    TooLarge { dims: [u64; 3], resolution: f64, enough: f64 },
+    TooLarge { dims: [u64; 3], resolution: f64, enough: Option<f64> },
     /// Not a cell size.
     #[error("a resolution of {value} m cannot be used")]
     Resolution { value: f64, at: Option<Span> },
@@ -110,12 +139,9 @@ pub(super) enum MapError {
     /// JSON or YAML beside or instead of the map.
     #[error("cannot read the map's {what}: {fault}")]
     Description { what: &'static str, fault: String, at: Option<Span> },
-    /// `mode: scale` or `raw`.
-    #[error("map mode `{mode}` is not read: only `trinary`")]
+    /// No mode of map_server's.
+    #[error("map mode `{mode}` is none of trinary, scale, raw")]
     Mode { mode: String, at: Span },
-    /// A turned image.
-    #[error("the map's origin is turned by {yaw} rad: only unturned maps are read")]
-    Turned { yaw: f64, at: Span },
     /// The image is not there.
     #[error("the image `{image}`, which the map names, is missing")]
     NoImage { image: String, at: Span },
@@ -151,11 +177,10 @@ impl Describe for MapError {
         use MapError::*;
         let d = Diagnostic::error(self.code(), self);
         match self {
-            Format { ending } => match ending.as_str() {
-                ".bt" | ".ot" => d.hint(format!("export the occupied leaves' centres as .pcd or .xyz; read are {FORMATS}")),
-                ".las" | ".laz" => d.hint(format!("convert it, e.g. `pdal translate map{ending} map.ply`; read are {FORMATS}")),
-                _ => d.hint(format!("read are {FORMATS}")),
-            },
+            Format { .. } => d.hint(format!("read are {FORMATS}")),
+            LazNotBuilt => {
+                d.hint("build with `cargo install --path . --features laz`, or unpack it: `pdal translate map.laz map.las`")
+            }
             UnknownHeaderLine { nearest, at, .. } => match nearest {
                 Some(near) => d.at(at).hint(format!("did you mean `{near}`?")),
                 None => d.at(at),
@@ -175,7 +200,14 @@ impl Describe for MapError {
                 d.number("points", *points as u64).number("not_finite", *not_finite as u64)
             }
             FarAway { .. } => d.hint("metres are expected; of a georeferenced cloud subtract the offset first"),
-            TooLarge { enough, .. } => d.hint(format!("resolution_m: {enough} would do, or cut the map to what is driven on")),
+            TooLarge { enough: Some(enough), .. } => {
+                d.hint(format!("resolution_m: {enough} would do, or cut the map to what is driven on"))
+            }
+            TooLarge { enough: None, .. } => d.hint("cut the map to what is driven on, or `height_m` to the robot's"),
+            NoLeaves => d.hint("an octree without known space says nothing about the floor: was it written before the first scan?"),
+            TreeCut { .. } | NodesDiffer { .. } => {
+                d.hint("the file was cut off while it was written or copied, or its header lies; make it again")
+            }
             Resolution { at, .. } => d.maybe_at(at.as_ref()).hint("metres per cell, such as 0.05"),
             ResolutionDiffers { own, .. } => d.hint(format!("leave `resolution_m` out, or write {own}")),
             NoResolution => d.hint(
@@ -185,8 +217,7 @@ impl Describe for MapError {
             Origin { at, .. } | Description { at, .. } => d.maybe_at(at.as_ref()),
             NpyType { expected: "booleans or integers", .. } => d.hint("threshold it first: numpy.save(file, grid > 0.5)"),
             NpyShape { shape } if shape.first() == Some(&3) => d.hint("it looks transposed: save points.T"),
-            Mode { at, .. } => d.at(at).hint("with `mode: trinary` the two thresholds decide"),
-            Turned { at, .. } => d.at(at).hint("turn the image, or the poses, and set the origin's third number to 0"),
+            Mode { at, .. } => d.at(at).hint("map_server's own default is trinary"),
             NoImage { at, .. } => d.at(at).hint("the path is relative to the .yaml"),
             NotPgm { .. } => d.hint("convert it, e.g. `magick map.png map.pgm`, and name that in the .yaml"),
             _ => d,
@@ -198,7 +229,7 @@ impl MapError {
     fn code(&self) -> &'static str {
         use MapError::*;
         match self {
-            Format { .. } | ImageAlone | NotThisFormat { .. } | NotPgm { .. } => "map/format",
+            Format { .. } | LazNotBuilt | ImageAlone | NotThisFormat { .. } | NotPgm { .. } => "map/format",
             NoHeaderEnd { .. }
             | UnknownHeaderLine { .. }
             | HeaderTwice { .. }
@@ -208,14 +239,21 @@ impl MapError {
             | PointsDiffer { .. }
             | NpyHeader { .. }
             | PgmHeader { .. }
+            | LasHeader { .. }
             | UnpackedSize { .. } => "map/header",
             NoCoordinate { .. } => "map/no-coordinate",
             Truncated { .. } => "map/truncated",
             Surplus { .. } => "map/surplus",
             RowsDiffer { promised, have, .. } if have < promised => "map/truncated",
             RowsDiffer { .. } => "map/surplus",
+            TreeCut { .. } => "map/truncated",
+            NodesDiffer { .. } => "map/surplus",
+            TooDeep { .. } | NoOccupancy { .. } => "map/damaged",
+            NoLeaves => "map/no-points",
             Columns { .. } | NotANumber { .. } | MixedSeparators { .. } => "map/row",
             Damaged { .. } => "map/damaged",
+            #[cfg(feature = "laz")]
+            LazDamaged { .. } => "map/damaged",
             NoPoints { .. } => "map/no-points",
             FarAway { .. } => "map/far-away",
             TooLarge { .. } => "map/too-large",
@@ -228,7 +266,6 @@ impl MapError {
             NpyShape { .. } => "map/shape",
             Description { .. } => "map/description",
             Mode { .. } => "map/mode",
-            Turned { .. } => "map/turned",
             NoImage { .. } => "map/no-image",
             Pixel { .. } => "map/pixel",
         }

@@ -4,16 +4,20 @@ mod boxes;
 mod describe;
 mod error;
 mod header;
+mod las;
 mod lzf;
 mod npy;
 mod occupancy;
+mod octomap;
 mod pcd;
 mod pgm;
 mod ply;
 mod points;
+mod survey;
 #[cfg(test)]
 mod tests;
 mod text;
+mod turned;
 mod voxelize;
 
 use std::path::{Path, PathBuf};
@@ -23,6 +27,7 @@ use crate::geom::Aabb;
 use crate::mission::{MapSpec, Unknown};
 
 use error::MapError;
+pub use survey::{Floor, Survey, survey};
 use voxelize::Slab;
 
 /// Cell size of point clouds where the mission gives none, m.
@@ -86,6 +91,24 @@ impl VoxelMap {
         // Bits beyond the grid stay zero, or they would be counted.
         if let (Some(last), rest @ 1..) = (column.last_mut(), self.dims[2] % 64) {
             *last = (1 << rest) - 1;
+        }
+    }
+
+    /// Marks, or clears, all cells from `low` to before `high`.
+    fn set_box(&mut self, low: [usize; 3], high: [usize; 3], occupied: bool) {
+        for word in low[2] / 64..high[2].div_ceil(64) {
+            let from = low[2].saturating_sub(word * 64).min(64);
+            let to = (high[2] - word * 64).min(64);
+            if from >= to {
+                continue;
+            }
+            let mask = (u64::MAX << from) & (u64::MAX >> (64 - to));
+            for i in low[0]..high[0] {
+                for j in low[1]..high[1] {
+                    let bits = &mut self.bits[(i * self.dims[1] + j) * self.words_per_column + word];
+                    *bits = if occupied { *bits | mask } else { *bits & !mask };
+                }
+            }
         }
     }
 
@@ -196,6 +219,7 @@ fn read(inputs: &MapInputs<'_>, spec: &MapSpec, robot_height: f64) -> Result<Vox
     let points = match ending(name).as_str() {
         ".pcd" => pcd::read(name, bytes)?,
         ".ply" => ply::read(name, bytes)?,
+        ".las" | ".laz" => las::read(bytes).map_err(|fault| vec![fault])?,
         ".xyz" | ".txt" | ".csv" => text::read(bytes).map_err(|fault| vec![fault])?,
         ".npy" => match npy::read(bytes).map_err(|fault| vec![fault])? {
             npy::Array::Points(points) => points,
@@ -213,6 +237,14 @@ fn read(inputs: &MapInputs<'_>, spec: &MapSpec, robot_height: f64) -> Result<Vox
                 Ok(_) => Err(faults),
                 Err(fault) => Err(faults.into_iter().chain([fault]).collect()),
             };
+        }
+        ".bt" | ".ot" => {
+            let tree = octomap::read(name, bytes)?;
+            let faults = origin_unused(spec);
+            if !faults.is_empty() {
+                return Err(faults);
+            }
+            return tree.voxels(spec.resolution, slab, spec.unknown).map_err(|fault| vec![fault]);
         }
         ".pgm" | ".png" => return Err(vec![MapError::ImageAlone]),
         other => return Err(vec![MapError::Format { ending: other.to_owned() }]),

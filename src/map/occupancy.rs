@@ -7,7 +7,7 @@ use serde::Deserialize;
 use serde_saphyr::Spanned;
 
 use super::error::MapError;
-use super::{FARTHEST, pgm, voxelize};
+use super::{FARTHEST, pgm, turned, voxelize};
 use super::{VoxelMap, voxelize::Slab};
 use crate::diag::{Source, Span};
 use crate::mission::Unknown;
@@ -35,12 +35,26 @@ enum Flag {
     Number(f64),
 }
 
+/// How map_server makes an occupancy of a pixel.
+#[derive(Clone, Copy, PartialEq)]
+enum Mode {
+    /// Occupied above one threshold, free below the other, unknown between them.
+    Trinary,
+    /// The same, but between them it is seen and not sure.
+    Scale,
+    /// The pixel is the occupancy in per cent; above 100 is unknown.
+    Raw,
+}
+
 /// The sheet, checked.
 pub(super) struct Sheet {
     image: String,
     image_at: Span,
     pub(super) resolution: f64,
     origin: [f64; 2],
+    /// How far the image is turned about that corner, from x to y, rad.
+    yaw: f64,
+    mode: Mode,
     negate: bool,
     occupied: f64,
     free: f64,
@@ -75,8 +89,6 @@ pub(super) fn sheet(name: &str, bytes: &[u8]) -> Result<Sheet, Vec<MapError>> {
     let usable = |v: &f64| v.abs() <= FARTHEST; // false for NaN
     if !(2..=3).contains(&origin.len()) || !origin.iter().all(usable) {
         faults.push(MapError::Origin { value: origin.clone(), limit: FARTHEST, at: Some(origin_at) });
-    } else if let Some(yaw) = origin.get(2).filter(|yaw| yaw.abs() > 1e-9) {
-        faults.push(MapError::Turned { yaw: *yaw, at: origin_at });
     }
     for (threshold, name) in [(&written.occupied_thresh, "occupied_thresh"), (&written.free_thresh, "free_thresh")] {
         if let Some(threshold) = threshold.as_ref().filter(|t| !(0.0..=1.0).contains(&t.value)) {
@@ -85,7 +97,13 @@ pub(super) fn sheet(name: &str, bytes: &[u8]) -> Result<Sheet, Vec<MapError>> {
             faults.push(MapError::HeaderValue { word, value, expected: "a number from 0 to 1", at });
         }
     }
-    if let Some(mode) = written.mode.as_ref().filter(|m| m.value != "trinary") {
+    let mode = match written.mode.as_ref().map_or("trinary", |mode| mode.value.as_str()) {
+        "scale" => Mode::Scale,
+        "raw" => Mode::Raw,
+        _ => Mode::Trinary,
+    };
+    let modes = ["trinary", "scale", "raw"];
+    if let Some(mode) = written.mode.as_ref().filter(|mode| !modes.contains(&mode.value.as_str())) {
         faults.push(MapError::Mode { mode: mode.value.clone(), at: span(&source, mode.referenced) });
     }
     if !faults.is_empty() {
@@ -96,6 +114,8 @@ pub(super) fn sheet(name: &str, bytes: &[u8]) -> Result<Sheet, Vec<MapError>> {
         image: written.image.value,
         resolution,
         origin: [origin[0], origin[1]],
+        yaw: origin.get(2).copied().unwrap_or(0.0),
+        mode,
         negate: written.negate.is_some_and(|flag| match flag {
             Flag::Bool(flag) => flag,
             Flag::Number(number) => number != 0.0,
@@ -116,12 +136,36 @@ fn span(source: &Arc<Source>, location: serde_saphyr::Location) -> Span {
     Span::new(source, start + begin..start + begin + shown)
 }
 
-/// What a pixel says.
-#[derive(Clone, Copy, PartialEq)]
-enum Seen {
+/// What a pixel says; the greater hides the less.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Seen {
     Free,
     Unknown,
     Occupied,
+}
+
+impl Sheet {
+    /// What a pixel of this lightness, 0 (black) to 1, says.
+    ///
+    /// As map_server does it; of \[0, 100\], which it makes of `scale` and `raw`, all counts as an obstacle that is not free by the
+    /// thresholds: it was seen, and nobody says that it can be driven on.
+    fn meaning(&self, light: f64) -> Seen {
+        let filled = if self.negate { light } else { 1.0 - light };
+        match self.mode {
+            Mode::Trinary | Mode::Scale if filled > self.occupied => Seen::Occupied,
+            Mode::Trinary | Mode::Scale if filled < self.free => Seen::Free,
+            Mode::Trinary => Seen::Unknown,
+            Mode::Scale => Seen::Occupied,
+            Mode::Raw => {
+                let light = if self.negate { 1.0 - light } else { light };
+                match (light * 255.0).round() {
+                    percent if percent > 100.0 => Seen::Unknown,
+                    percent if percent / 100.0 < self.free => Seen::Free,
+                    _ => Seen::Occupied,
+                }
+            }
+        }
+    }
 }
 
 /// Makes columns of the image's occupied pixels, from the floor to the slab's upper end.
@@ -132,32 +176,25 @@ pub(super) fn voxels(sheet: &Sheet, image: Option<&[u8]>, slab: Slab, unknown: U
     let top = slab.high.min(TALLEST).max(bottom);
     // Cells that reach `top`; a hair above a whole number of cells is rounding.
     let layers = ((top - bottom) / sheet.resolution - 1e-9).ceil().max(1.0);
-    let size = voxelize::checked([image.width as i64, image.height as i64, layers as i64], sheet.resolution)?;
-    let origin = [sheet.origin[0], sheet.origin[1], bottom];
-    let mut map = VoxelMap::new(sheet.resolution, origin, size, unknown);
-    let max = f64::from(image.max);
-    let meaning: Vec<Seen> = (0..=image.max)
-        .map(|value| {
-            let light = f64::from(value) / max;
-            let filled = if sheet.negate { light } else { 1.0 - light };
-            match (filled > sheet.occupied, filled < sheet.free) {
-                (true, _) => Seen::Occupied,
-                (_, true) => Seen::Free,
-                _ => Seen::Unknown,
-            }
-        })
-        .collect();
-    for (row, pixels) in image.pixels.chunks_exact(image.width).enumerate() {
-        let j = image.height - 1 - row; // the top row is the largest y
-        for (i, pixel) in pixels.iter().enumerate() {
-            let seen = meaning[usize::from(*pixel)];
-            let only_unknown = seen == Seen::Unknown && unknown == Unknown::Occupied;
-            if only_unknown {
-                map.statistics.unknown += size[2];
-            }
-            if only_unknown || seen == Seen::Occupied {
-                map.occupy_column(i, j);
-            }
+    let [width, height] = turned::size(image.width, image.height, sheet.yaw);
+    voxelize::checked([width, height, layers as i64], sheet.resolution)?;
+    let meaning: Vec<Seen> =
+        (0..=image.max).map(|value| sheet.meaning(f64::from(value) / f64::from(image.max))).collect();
+    // The top row is the largest y.
+    let rows = image.pixels.chunks_exact(image.width).rev();
+    let cells = rows.flatten().map(|pixel| meaning[usize::from(*pixel)]).collect();
+    let upright = turned::Sheet { width: image.width, height: image.height, cells };
+    let (seen, corner) = turned::turn(upright, sheet.yaw);
+    let origin = [0, 1].map(|a| sheet.origin[a] + corner[a] * sheet.resolution);
+    let size = [seen.width, seen.height, layers as usize];
+    let mut map = VoxelMap::new(sheet.resolution, [origin[0], origin[1], bottom], size, unknown);
+    for (at, seen_here) in seen.cells.iter().enumerate() {
+        let only_unknown = *seen_here == Seen::Unknown && unknown == Unknown::Occupied;
+        if only_unknown {
+            map.statistics.unknown += size[2];
+        }
+        if only_unknown || *seen_here == Seen::Occupied {
+            map.occupy_column(at % seen.width, at / seen.width);
         }
     }
     Ok(map)

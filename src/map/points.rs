@@ -67,6 +67,9 @@ pub(super) struct Column {
 pub(super) enum Points<'a> {
     /// Binary records. The reader has checked that all of `count` lie within `bytes`.
     Packed { bytes: Cow<'a, [u8]>, count: usize, columns: [Column; 3] },
+    /// Records that begin with three i32, low byte first, each to be scaled and moved. The reader has checked that all of `count`
+    /// lie within `records`.
+    Scaled { records: Cow<'a, [u8]>, stride: usize, count: usize, scale: [f64; 3], offset: [f64; 3] },
     /// From text, or from records of varying length.
     List(Vec<[f64; 3]>),
 }
@@ -75,7 +78,7 @@ impl Points<'_> {
     /// How many there are.
     pub(super) fn len(&self) -> usize {
         match self {
-            Self::Packed { count, .. } => *count,
+            Self::Packed { count, .. } | Self::Scaled { count, .. } => *count,
             Self::List(list) => list.len(),
         }
     }
@@ -84,6 +87,14 @@ impl Points<'_> {
     pub(super) fn for_each(&self, mut f: impl FnMut([f64; 3])) {
         match self {
             Self::List(list) => list.iter().for_each(|p| f(*p)),
+            Self::Scaled { records, stride, count, scale, offset } => {
+                for record in records.chunks_exact(*stride).take(*count) {
+                    let steps = |a: usize| {
+                        f64::from(i32::from_le_bytes(record[4 * a..4 * a + 4].try_into().expect("four bytes")))
+                    };
+                    f([0, 1, 2].map(|a| steps(a) * scale[a] + offset[a]));
+                }
+            }
             Self::Packed { bytes, count, columns } => {
                 let is = |scalar| columns.iter().all(|c| c.scalar == scalar && !c.big_endian);
                 if is(Scalar::F32) {

@@ -19,7 +19,7 @@ pub(super) struct Slab {
 }
 
 impl Slab {
-    fn holds(self, z: f64) -> bool {
+    pub(super) fn holds(self, z: f64) -> bool {
         self.low <= z && z <= self.high
     }
 }
@@ -56,7 +56,7 @@ pub(super) fn checked(cells: [i64; 3], resolution: f64) -> Result<[usize; 3], Ma
         }
     }
     let enough = (enough * 1e9).round() / 1e9;
-    Err(MapError::TooLarge { dims: cells, resolution, enough })
+    Err(MapError::TooLarge { dims: cells, resolution, enough: Some(enough) })
 }
 
 /// Voxels of a point cloud: cell floor(p / resolution) of every point in the slab. The grid's rectangle is that of all finite

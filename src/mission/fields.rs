@@ -99,13 +99,13 @@ static MAP: [Field; 5] = [
         "file",
         Shape::Text,
         "../maps/arch_bridges.pcd",
-        "the map: .pcd, .ply, .xyz, .csv, .npy, or a map_server .yaml; relative to the mission",
+        "the map: .pcd, .ply, .las, .xyz, .csv, .npy, .bt, .ot, or a map_server .yaml; relative to the mission",
     ),
     Field::optional(
         "resolution_m",
         Shape::Number(Bounds::positive("m")),
         "0.05",
-        "cell size of point clouds, metres; default 0.05; grids bring their own",
+        "cell size of point clouds, metres; default 0.05; grids bring their own, octrees may be covered by others",
     ),
     Field::optional(
         "height_m",

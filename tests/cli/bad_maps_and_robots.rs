@@ -91,9 +91,9 @@ fn grids() {
         depot(s);
         s.edit("maps/depot.yaml", "image: depot.pgm\n", "");
     });
-    spoiled("map_turned", 2, |s| {
+    spoiled("map_origin", 2, |s| {
         depot(s);
-        s.edit("maps/depot.yaml", "[0.0, 0.0, 0]", "[0.0, 0.0, 0.5]");
+        s.edit("maps/depot.yaml", "[0.0, 0.0, 0]", "[0.0, .nan, 0]");
     });
 }
 

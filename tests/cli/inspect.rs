@@ -112,7 +112,7 @@ fn every_kind_of_file_can_be_drawn_and_the_same_file_draws_the_same() {
     for (file, expected) in [
         ("robots/scr_db/robot.yaml", &["Robot scr_db", "joints at 50 % of their range", "moved by joints"][..]),
         ("missions/a.yaml", &["Mission a", "obstacle", "start", "goal"]),
-        ("maps/first.csv", &["Map maps/first.csv", "obstacle", "x m"]),
+        ("maps/first.csv", &["Map maps/first.csv", "up to z 0.40 m", "slice at z 0.23 m", "x m"]),
         ("out/a/commands.csv", &["Commands out/a/commands.csv", "obstacle", "path of the base", "rim speed m/s"]),
         ("out/a/commands.mcap", &["Commands out/a/commands.mcap", "rim speed m/s"]),
     ] {

@@ -134,7 +134,7 @@ impl Site<'_> {
             return;
         }
         if mission.path.is_none() {
-            place.field();
+            place.field(1);
         }
         let names = std::iter::once(&file.name).chain(file.beside.as_ref().map(|(name, _)| name));
         let files = names.filter_map(|name| read.iter().find(|(path, _)| path == Path::new(name)).cloned()).collect();

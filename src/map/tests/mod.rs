@@ -5,6 +5,8 @@ mod faults;
 mod files;
 mod formats;
 mod images;
+mod las;
+mod octrees;
 mod writers;
 
 use super::*;

@@ -138,7 +138,7 @@ fn depth(convex: &Convex) -> f64 {
 }
 
 impl Pair {
-    /// The nearest points, or a lower bound of the distance that is at least `enough`.
+    /// The nearest points, or, unless `enough` is infinite, a lower bound of a distance beyond the margin.
     pub fn meeting(&self, robot: &RobotModel, frames: &[BodyFrame], enough: f64) -> Result<Meeting, f64> {
         let shapes = self.shapes.map(|shape| &robot.shapes[shape]);
         let [a, b] = shapes.map(|shape| Placed::new(shape, &frames[shape.body]));
@@ -147,29 +147,33 @@ impl Pair {
         if farther >= enough {
             return Err(farther);
         }
-        let close = |gap: gjk::Gap| gap.lower >= enough || gap.upper - gap.lower <= TOLERANCE;
+        // How far apart those are that are far enough need be known to a factor of two only.
+        let apart = |gap: gjk::Gap| {
+            gap.lower >= enough || (enough.is_finite() && gap.lower - MARGIN > 0.5 * (gap.upper - MARGIN).max(0.0))
+        };
+        let close = |gap: gjk::Gap| apart(gap) || gap.upper - gap.lower <= TOLERANCE;
         let support = |d: &Vector3<f64>| {
             let first = a.support(d);
             [first - b.support(&-d), first]
         };
-        let (gap, first, apart) = gjk::with_points(support, between, close);
-        if gap.lower >= enough {
+        let (gap, first, way) = gjk::with_points(support, between, close);
+        if apart(gap) {
             return Err(gap.lower);
         }
         let bodies = shapes.map(|shape| shape.body);
         if gap.upper > TOUCHING {
-            let normal = apart / gap.upper;
-            return Ok(Meeting { bodies, arms: [first, first - apart], distance: gap.upper, normal });
+            return Ok(Meeting { bodies, arms: [first, first - way], distance: gap.upper, normal: way / gap.upper });
         }
         let support = |d: &Vector3<f64>| {
             let first = a.core_support(d);
             [first - b.core_support(&-d), first]
         };
-        let (gap, first, apart) = gjk::with_points(support, between, close);
+        let exact = |gap: gjk::Gap| gap.upper - gap.lower <= TOLERANCE;
+        let (gap, first, way) = gjk::with_points(support, between, exact);
         let cores = -depth(a.convex) - depth(b.convex);
         if gap.upper > TOUCHING {
             let distance = (gap.upper + cores).min(0.0);
-            return Ok(Meeting { bodies, arms: [first, first - apart], distance, normal: apart / gap.upper });
+            return Ok(Meeting { bodies, arms: [first, first - way], distance, normal: way / gap.upper });
         }
         let normal = between.try_normalize(TOUCHING).unwrap_or_else(Vector3::z);
         Ok(Meeting { bodies, arms: [a.centre, b.centre], distance: cores.min(farther), normal })

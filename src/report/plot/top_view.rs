@@ -12,6 +12,8 @@ use crate::robot::RobotModel;
 const OBSTACLE: &str = "#7b828c";
 /// What the robot can pass under.
 const OVERHEAD: &str = "#c9cfd8";
+/// Quarters of a map's height, from the lowest.
+const SHADES: [&str; 4] = ["#c3cbd6", "#96a0ae", "#66707e", "#363d47"];
 /// Room above for the legend, px.
 const TOP: f64 = 26.0;
 /// A view is no higher than this, px, unless it is wider than that too.
@@ -24,7 +26,7 @@ pub struct TopView {
     high: [f64; 2],
     items: Vec<Item>,
     /// Legend: paint and text, each once.
-    legend: Vec<(Paint, &'static str)>,
+    legend: Vec<(Paint, String)>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -65,14 +67,43 @@ impl TopView {
         };
         for (name, colour, overhead) in [("overhead", OVERHEAD, true), ("obstacle", OBSTACLE, false)] {
             let of_kind = |z: f64| (z >= under - 1e-9) == overhead;
-            let loops = outline::of_cells(dims, |i, j| lowest(i, j).is_some_and(of_kind));
-            let metres = |c: [usize; 2]| [0, 1].map(|a| map.origin[a] + map.resolution * c[a] as f64);
-            let loops: Vec<Vec<[f64; 2]>> = loops.into_iter().map(|l| l.into_iter().map(metres).collect()).collect();
-            if !loops.is_empty() {
-                view.add(Item::Outlines(loops, Paint::fill(colour)), Paint::fill(colour), name);
+            if (0..dims[0]).any(|i| (0..dims[1]).any(|j| lowest(i, j).is_some_and(of_kind))) {
+                view.cells(map, |i, j| lowest(i, j).is_some_and(of_kind), colour, name.to_owned());
             }
         }
         view
+    }
+
+    /// A view of a map, columns by how high their highest obstacle reaches in the grid: the darker, the higher.
+    pub fn by_height(map: &VoxelMap) -> Self {
+        let mut view = Self::new(map.bounds());
+        let part = |i: usize, j: usize| {
+            let words = map.column(i, j);
+            let word = words.iter().rposition(|w| *w != 0)?;
+            let highest = 64 * word + 63 - words[word].leading_zeros() as usize;
+            Some(highest * SHADES.len() / map.dims[2])
+        };
+        for (shade, colour) in SHADES.iter().enumerate() {
+            let reach = map.dims[2] * (shade + 1) / SHADES.len();
+            let top = map.origin[2] + map.resolution * reach as f64;
+            view.cells(map, |i, j| part(i, j) == Some(shade), colour, format!("up to z {top:.2} m"));
+        }
+        view
+    }
+
+    /// A view of one layer of a map's cells.
+    pub fn slice(map: &VoxelMap, layer: usize) -> Self {
+        let mut view = Self::new(map.bounds());
+        let z = map.origin[2] + map.resolution * (layer as f64 + 0.5);
+        view.cells(map, |i, j| map.occupied([i, j, layer]), OBSTACLE, format!("slice at z {z:.2} m"));
+        view
+    }
+
+    fn cells(&mut self, map: &VoxelMap, inside: impl Fn(usize, usize) -> bool, colour: &'static str, name: String) {
+        let metres = |c: [usize; 2]| [0, 1].map(|a| map.origin[a] + map.resolution * c[a] as f64);
+        let loops = outline::of_cells([map.dims[0], map.dims[1]], inside);
+        let loops = loops.into_iter().map(|l| l.into_iter().map(metres).collect()).collect();
+        self.add(Item::Outlines(loops, Paint::fill(colour)), Paint::fill(colour), name);
     }
 
     /// The path of the base frame's origin through these points.
@@ -125,8 +156,9 @@ impl TopView {
         self.items.push(Item::Note(at, text.into()));
     }
 
-    fn add(&mut self, item: Item, paint: Paint, name: &'static str) {
+    fn add(&mut self, item: Item, paint: Paint, name: impl Into<String>) {
         self.items.push(item);
+        let name = name.into();
         if !self.legend.iter().any(|(_, known)| *known == name) {
             self.legend.push((paint, name));
         }
