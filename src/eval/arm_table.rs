@@ -113,7 +113,7 @@ pub(super) fn render(judged: &[Judged]) -> String {
     }
     let mut text = table.render();
     text += "TopAY: 120 pairs a kind of its own benchmark and robot, measured by the project's owner; ours: rooms drawn after that benchmark,\n\
-             with a way for the base alone, at the same limits.\n";
+             with a way for the base alone that has half a cell's diagonal to spare, at the same limits.\n";
     for row in &rows {
         if let (1.., Some(lowest)) = (row.below_floor, row.lowest_m) {
             let reach = if row.below_floor == 1 { "reaches" } else { "reach" };

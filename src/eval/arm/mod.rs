@@ -25,6 +25,9 @@ const SIDE: i32 = 400;
 const HEIGHT: i32 = 32;
 /// What is certified, m.
 const CLEARANCE: f64 = 0.02;
+/// What the base's way has to spare on each side beyond that, m: half a cell's diagonal. So wide a way holds positions of any lattice of
+/// such cells; a narrower one is a matter of how the lattice lies.
+const TO_SPARE: f64 = 0.5 * std::f64::consts::SQRT_2 * CELL;
 /// What start and goal keep clear of obstacles, m: more than is certified, so that no pair is lost to rounding.
 const FREE: f64 = 0.03;
 /// Start and goal are this far apart, m.
@@ -116,7 +119,7 @@ fn scene(rng: &mut Rng, kind: Kind, body: &Body<'_>, id: &str) -> Option<Value> 
 
 /// Start and goal: far enough apart and not too far, joined by a way for the base, and each free with a random posture.
 fn poses(rng: &mut Rng, body: &Body<'_>, placed: &[CellBox], boxes: &[Aabb]) -> Option<[(Pose2, Vec<f64>); 2]> {
-    let plan = Plan::new(placed, body.top() + CLEARANCE, body.radius() + CLEARANCE);
+    let plan = Plan::new(placed, body.top() + CLEARANCE, body.radius() + CLEARANCE + TO_SPARE);
     (0..POSE_TRIES).find_map(|_| {
         let mut pose = || {
             let [x, y] = [0, 1].map(|_| rounded(rng.uniform(0.0, metres(SIDE))));
