@@ -153,9 +153,9 @@ impl<'a, const W: usize> Collider<'a, W> {
             let place = |p: &Vec<nalgebra::Isometry3<f64>>| Posed::new(&p[s]);
             if robot.is_moved(shape.body) {
                 let poses: Vec<Posed> = places.iter().map(place).collect();
-                moving.push(Placed::new(&shape.convex, poses, &postures));
+                moving.push(Placed::new(s, &shape.convex, poses, &postures));
             } else {
-                rigid.push(Placed::new(&shape.convex, vec![place(&places[0])], &postures));
+                rigid.push(Placed::new(s, &shape.convex, vec![place(&places[0])], &postures));
             }
         }
         let mut heights = [f64::INFINITY, f64::NEG_INFINITY];
@@ -227,6 +227,10 @@ impl<'a, const W: usize> Collider<'a, W> {
         out
     }
 
+    pub fn robot(&self) -> &'a RobotModel {
+        self.robot
+    }
+
     /// Side of the map's cells, m.
     pub fn resolution(&self) -> f64 {
         self.map.resolution
@@ -251,6 +255,30 @@ impl<'a, const W: usize> Collider<'a, W> {
             }
         }
         free
+    }
+
+    /// Tells of any posture whether the moving shapes are clear and no links touch, the base standing.
+    pub fn standing(&self, pose: Pose2) -> impl Fn(&[f64]) -> bool + '_ {
+        // Other postures may reach farther than those that were sampled.
+        const FARTHER: f64 = 0.5;
+        let base: Base = pose.into();
+        let mut region = self.region([pose.x, pose.y], [pose.x, pose.y], self.reach + self.clearance + FARTHER);
+        (region.min[2], region.max[2]) = (region.min[2] - FARTHER, region.max[2] + FARTHER);
+        let mut boxes = Vec::new();
+        obstacles::collect(self.map, &region, &mut boxes);
+        let near = Near { boxes, hint: Cell::new(Vector3::x()) };
+        let pairs = self.robot.self_pairs();
+        move |joints| {
+            let poses = self.robot.shape_poses(joints);
+            let clear = |placed: &Placed| {
+                let own = Posed::new(&poses[placed.shape]);
+                let far = self.esdf.distance(base.map(&own.centre)) - TOO_HIGH * self.map.resolution - placed.radius;
+                let end = own.under(&base);
+                let sweep = Sweep { ends: [end, end], bulge: 0.0 };
+                far >= self.clearance || self.exact_gap(placed, &sweep, &near, self.clearance).lower >= self.clearance
+            };
+            self.moving.iter().all(clear) && self.robot.touching(&pairs, joints).is_none()
+        }
     }
 
     /// What moving shapes take up in every posture that is searched: balls in them that no joint moves.

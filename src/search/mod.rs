@@ -9,6 +9,7 @@ mod bits;
 mod collide;
 mod drive;
 mod error;
+mod escape;
 mod explain;
 mod guide;
 mod headed;

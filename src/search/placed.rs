@@ -105,6 +105,8 @@ pub(super) struct Ball {
 /// A shape with its places.
 pub(super) struct Placed {
     pub convex: Convex,
+    /// Index of the shape in the robot.
+    pub shape: usize,
     /// Half extents of the shape's own bounding box, m.
     pub half: [f64; 3],
     /// Radius of the ball about the centre that holds the shape, m.
@@ -121,7 +123,7 @@ pub(super) struct Placed {
 }
 
 impl Placed {
-    pub fn new(convex: &Convex, poses: Vec<Posed>, postures: &Postures) -> Self {
+    pub fn new(shape: usize, convex: &Convex, poses: Vec<Posed>, postures: &Postures) -> Self {
         let half = convex.half_extents();
         let radius = convex.bounding_radius();
         let step_moves: Vec<f64> = postures
@@ -140,7 +142,17 @@ impl Placed {
             let centres = poses.iter().map(|pose| pose.centre + pose.rotation * centre).collect();
             Ball { centres, inner }
         });
-        Self { convex: convex.clone(), half, radius, balls: balls.collect(), ball_radius, poses, reach, step_moves }
+        Self {
+            convex: convex.clone(),
+            shape,
+            half,
+            radius,
+            balls: balls.collect(),
+            ball_radius,
+            poses,
+            reach,
+            step_moves,
+        }
     }
 }
 

@@ -38,6 +38,8 @@ pub(super) struct Roadmap {
     pub step_time: f64,
     /// Postures that are meant for the start and for the goal.
     pub ends: [Vec<u32>; 2],
+    /// How many of the postures are folded or spread ones; the first.
+    pub keys: usize,
 }
 
 /// Most postures there can be: bits of the widest mask.
@@ -107,6 +109,45 @@ impl Postures {
     /// Whether every posture there is has one of these near it: then what is not found does not exist.
     pub fn is_exhaustive(&self) -> bool {
         matches!(self.steps, Steps::Grid { .. })
+    }
+
+    /// Ends from which no folded or spread posture is reached among the free ones, and those of them that are free.
+    pub fn shut_in<const W: usize>(
+        &self,
+        neighbours: &Neighbours<W>,
+        end: End,
+        free: Bits<W>,
+    ) -> Option<(usize, Vec<usize>)> {
+        let Steps::Roadmap(roadmap) = &self.steps else { return None };
+        let mut wanted = Bits::EMPTY;
+        (0..roadmap.keys).for_each(|key| wanted.insert(key));
+        let mut set = Bits::EMPTY;
+        roadmap.ends[end as usize].iter().for_each(|p| set.insert(*p as usize));
+        let from = set.and(free).iter().next()?;
+        let out = neighbours.flood(set, free).and(wanted);
+        out.is_empty().then(|| (from, wanted.and(free).iter().collect()))
+    }
+
+    /// With a way of postures, the first and last of which are in it already; as many of the others as there is room for.
+    pub fn with_way(&self, way: &[Vec<f64>], most: usize) -> Self {
+        let mut more = self.clone();
+        let known = |posture: &Vec<f64>| self.values.iter().position(|own| own == posture);
+        let Steps::Roadmap(roadmap) = &mut more.steps else { return more };
+        let (Some(from), Some(to)) = (known(&way[0]), known(&way[way.len() - 1])) else { return more };
+        let room = most.saturating_sub(self.values.len()).max(1);
+        let inner = &way[1..way.len() - 1];
+        let every = (inner.len() as f64 / room as f64).ceil().max(2.0) as usize;
+        let mut last = from as u32;
+        for posture in inner.iter().skip(every - 1).step_by(every) {
+            let next = more.values.len() as u32;
+            more.values.push(posture.clone());
+            roadmap.neighbours.push(vec![last]);
+            roadmap.neighbours[last as usize].push(next);
+            last = next;
+        }
+        roadmap.neighbours[last as usize].push(to as u32);
+        roadmap.neighbours[to].push(last);
+        more
     }
 
     /// The posture in which the robot is folded up most, where that is known.

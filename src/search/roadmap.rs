@@ -24,14 +24,14 @@ struct Size {
     open: usize,
     /// Ways from an end to the nearest others, and from each of the others.
     ways: [usize; 2],
-    /// Most postures.
+    /// Most postures, so that there is room for ways out of narrow places.
     most: usize,
 }
 
 /// Enough for most, and enough for nearly all.
 const SIZES: [Size; 2] = [
-    Size { surveyed: 64, folded: 3, spread: 3, open: 4, ways: [2, 1], most: FEW_POSTURES },
-    Size { surveyed: 192, folded: 5, spread: 16, open: 6, ways: [6, 2], most: MOST_POSTURES },
+    Size { surveyed: 64, folded: 3, spread: 3, open: 4, ways: [2, 1], most: FEW_POSTURES - 40 },
+    Size { surveyed: 192, folded: 5, spread: 16, open: 6, ways: [6, 2], most: MOST_POSTURES - 64 },
 ];
 /// What a metre of height is worth in metres of width, of a folded robot: some are narrow, to pass between things, some low, to pass
 /// under them.
@@ -81,6 +81,7 @@ pub(super) fn build(
 impl Builder<'_> {
     fn roadmap(&self, asked: [&[Option<f64>]; 2]) -> (Vec<Vec<f64>>, Roadmap) {
         let (folded, mut keys) = self.folded_and_spread();
+        let own = keys.len();
         let mut ends: [Vec<u32>; 2] = Default::default();
         for (own, asked) in ends.iter_mut().zip(asked) {
             for posture in self.of_end(asked, &keys[..folded]) {
@@ -92,7 +93,7 @@ impl Builder<'_> {
             }
         }
         let ways = self.ways(&keys, folded, &ends);
-        self.sampled(keys, ends, &ways)
+        self.sampled(keys, own, ends, &ways)
     }
 
     /// Time between two postures, each joint at its planning speed, s.
@@ -247,7 +248,13 @@ impl Builder<'_> {
     }
 
     /// All ways as postures close together, as close as their greatest number allows.
-    fn sampled(&self, keys: Vec<Vec<f64>>, ends: [Vec<u32>; 2], ways: &[[usize; 2]]) -> (Vec<Vec<f64>>, Roadmap) {
+    fn sampled(
+        &self,
+        keys: Vec<Vec<f64>>,
+        own: usize,
+        ends: [Vec<u32>; 2],
+        ways: &[[usize; 2]],
+    ) -> (Vec<Vec<f64>>, Roadmap) {
         let times: Vec<f64> = ways.iter().map(|[a, b]| self.time(&keys[*a], &keys[*b])).collect();
         let inner = |step: f64| times.iter().map(|time| (time / step).ceil().max(1.0) as usize - 1).sum::<usize>();
         let mut step = STEP_TIME;
@@ -273,11 +280,88 @@ impl Builder<'_> {
             }
         }
         neighbours.iter_mut().for_each(|own| own.sort_unstable());
-        (values, Roadmap { neighbours, step_time: longest.max(1e-6), ends })
+        (values, Roadmap { neighbours, step_time: longest.max(1e-6), ends, keys: own })
     }
 }
 
 /// The posture so far on the straight way from one to another.
 fn between(a: &[f64], b: &[f64], share: f64) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::arm;
+    use super::*;
+
+    const NEAR: [f64; 5] = [0.0; 5];
+
+    fn asked(values: [f64; 5]) -> Vec<Option<f64>> {
+        values.map(Some).to_vec()
+    }
+
+    #[test]
+    fn steps_are_short_go_both_ways_and_lead_from_start_to_goal_without_links_that_touch() {
+        let robot = arm(5);
+        let pairs = robot.self_pairs();
+        assert!(!pairs.is_empty());
+        let ends = [asked([0.3, 0.4, -0.2, 0.5, 0.1]), asked([-1.0, 0.2, 0.7, -0.6, 0.3])];
+        for level in 0..SIZES.len() {
+            let (values, roadmap) = build(&robot, &NEAR, [&ends[0], &ends[1]], level);
+            assert!(values.len() <= SIZES[level].most, "{}", values.len());
+            for (p, own) in roadmap.neighbours.iter().enumerate() {
+                for q in own {
+                    assert!(roadmap.neighbours[*q as usize].contains(&(p as u32)));
+                    let time = (values[p].iter().zip(&values[*q as usize]).zip(&robot.joints))
+                        .map(|((a, b), joint)| (a - b).abs() / joint.limits.planning()[0]);
+                    assert!(time.fold(0.0, f64::max) <= roadmap.step_time + 1e-9);
+                }
+            }
+            assert!(values.iter().all(|q| robot.touching(&pairs, q).is_none()));
+            for (own, asked) in roadmap.ends.iter().zip(&ends) {
+                let exact: Vec<f64> = asked.iter().flatten().copied().collect();
+                assert_eq!(own.iter().map(|p| &values[*p as usize]).collect::<Vec<_>>(), [&exact]);
+            }
+            let mut seen = vec![false; values.len()];
+            let mut open = vec![roadmap.ends[0][0]];
+            while let Some(p) = open.pop() {
+                if !std::mem::replace(&mut seen[p as usize], true) {
+                    open.extend(&roadmap.neighbours[p as usize]);
+                }
+            }
+            assert!(seen[roadmap.ends[1][0] as usize]);
+        }
+    }
+
+    #[test]
+    fn joints_that_an_end_leaves_open_have_several_values_there_and_the_others_the_one_asked_for() {
+        let robot = arm(5);
+        let mut open = asked([0.3; 5]);
+        (open[1], open[3]) = (None, None);
+        let none = vec![None; 5];
+        let (values, roadmap) = build(&robot, &NEAR, [&open, &none], 0);
+        assert!(roadmap.ends[0].len() > 2 && roadmap.ends[1].is_empty());
+        for p in &roadmap.ends[0] {
+            let q = &values[*p as usize];
+            assert_eq!([q[0], q[2], q[4]], [0.3; 3]);
+        }
+    }
+
+    #[test]
+    fn the_first_posture_is_narrower_than_nearly_all_there_are() {
+        let robot = arm(5);
+        let none = vec![None; 5];
+        let (values, _) = build(&robot, &NEAR, [&none, &none], 1);
+        let width = |q: &[f64]| robot.radius(q);
+        let narrower = (1..=500).filter(|index| {
+            let q: Vec<f64> = robot
+                .joints
+                .iter()
+                .enumerate()
+                .map(|(axis, joint)| joint.lower + halton::value(axis, *index) * (joint.upper - joint.lower))
+                .collect();
+            width(&q) < width(&values[0]) - 1e-3
+        });
+        assert!(narrower.count() < 15);
+    }
 }

@@ -3,6 +3,7 @@
 use super::astar::{self, AStar, Outcome};
 use super::bits::Bits;
 use super::collide::{BaseMotion, Collider, Mast, TOO_LOW};
+use super::escape::Escape;
 use super::guide::{self, Guide};
 use super::headed::{self, Headed};
 use super::heuristic::{self, Core, CostToGo};
@@ -80,6 +81,11 @@ impl<'a, const W: usize> Solver<'a, W> {
     pub fn new(problem: Problem<'a>, postures: Postures) -> Result<Self, End> {
         let Problem { map, esdf, robot, query, options } = problem;
         let mut collider = Collider::<W>::new(robot, esdf, map, options.clearance, postures);
+        for (end, pose) in [(End::Start, query.start), (End::Goal, query.goal)] {
+            if let Some(more) = with_way_out(&collider, end, pose, query) {
+                collider = Collider::<W>::new(robot, esdf, map, options.clearance, more);
+            }
+        }
         let mut start_postures =
             free_postures(&collider, query.start, End::Start, &query.start_joints).ok_or(End::Start)?;
         let mut goal_postures = goal_postures(&collider, query).ok_or(End::Goal)?;
@@ -287,6 +293,22 @@ fn grain_of_try(attempt: usize) -> Grain {
 /// Metres of straight driving that take as long as a radian of turning, whatever its radius (\[SCR\] Eq. 14).
 fn turn_cost(robot: &RobotModel) -> f64 {
     (robot.track_width / (2.0 * robot.base.eta)).clamp(LEAST_TURN_COST, MOST_TURN_COST)
+}
+
+/// The postures and a way out of the one at an end, where no way that is there already leads out of it.
+fn with_way_out<const W: usize>(collider: &Collider<'_, W>, end: End, pose: Pose2, query: &Query) -> Option<Postures> {
+    if end == End::Goal && query.goal_yaw.is_none() {
+        return None;
+    }
+    let postures = &collider.postures;
+    let free = collider.free(&BaseMotion { from: pose, to: pose });
+    let (from, to) = postures.shut_in(&collider.neighbours, end, free)?;
+    let to: Vec<Vec<f64>> = to.into_iter().map(|posture| postures.joints(posture).to_vec()).collect();
+    let from = postures.joints(from);
+    let way = Escape::new(collider.robot(), from, collider.standing(pose)).way(from, &to)?;
+    // Half of the room that is left for each end.
+    let room = (64 * W - postures.count()) / if end == End::Start { 2 } else { 1 };
+    Some(postures.with_way(&way, postures.count() + room))
 }
 
 /// Postures that are free in a pose and agree with what is asked for.

@@ -403,3 +403,46 @@ proptest! {
         }
     }
 }
+
+/// A round base with a serial arm of so many joints, z and y by turns, each link a rod of 0.2 m.
+pub(super) fn arm(joints: usize) -> RobotModel {
+    let mut robot = small_box();
+    let limits = MotionLimits { speed: Some(1.0), acceleration: Some(2.0), jerk: Some(10.0) };
+    let joint = |k: usize| MovingJoint { name: format!("j{k}"), prismatic: false, lower: -2.4, upper: 2.4, limits };
+    robot.joints = (0..joints).map(joint).collect();
+    for k in 0..joints {
+        let axis = if k % 2 == 0 { Vector3::z_axis() } else { Vector3::y_axis() };
+        let link = format!("link {k}");
+        robot.bodies.push(Body {
+            link: link.clone(),
+            parent: k,
+            origin: Isometry3::translation(0.0, 0.0, 0.2),
+            motion: Some(BodyMotion { joint: k, multiplier: 1.0, offset: 0.0, axis, prismatic: false }),
+        });
+        robot.shapes.push(Shape {
+            link,
+            body: k + 1,
+            pose: Isometry3::translation(0.0, 0.0, 0.11),
+            convex: Convex::Cylinder { radius: 0.02, half_length: 0.08 },
+        });
+    }
+    robot
+}
+
+#[test]
+fn an_arm_folds_to_pass_a_low_opening_and_ends_in_the_posture_asked_for() {
+    let robot = arm(4);
+    let map = room_with_opening(0.6, 0.75);
+    let upright = vec![Some(0.0); 4];
+    let bent = vec![Some(0.5), Some(0.8), Some(0.0), Some(0.3)];
+    let query = Query { start_joints: upright, goal_joints: bent.clone(), ..across(None) };
+    // Upright it is 1 m tall.
+    let path = find(&map, &robot, &query, 0.02).expect("it can fold");
+    assert_eq!(path.states[0].joints, [0.0; 4]);
+    let last = &path.states[path.states.len() - 1];
+    assert_eq!(last.joints.iter().copied().map(Some).collect::<Vec<_>>(), bent);
+    let folded = path.states.iter().filter(|state| (1.4..1.6).contains(&state.pose.x));
+    for state in folded {
+        assert!(robot.extents(&state.joints).max[2] <= 0.75 - 0.02 + 1e-9, "{state:?}");
+    }
+}
