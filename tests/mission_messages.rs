@@ -112,6 +112,13 @@ fn wrong_values() {
     mission("resolution", &with("map: {file: a.pcd, resolution_m: 0}"));
     mission("height_crossed", &with("map: {file: a.pcd, height_m: [1.0, 0.02]}"));
     mission("height_count", &with("map: {file: a.pcd, height_m: [1.0]}"));
+    let map = |added: &str| with(&format!("map: {{file: a.pcd, {added}}}"));
+    mission("keep_out_line", &map("keep_out: [{polygon_m: [[0, 0], [1, 1], [2, 2]]}]"));
+    mission("keep_out_height", &map("keep_out: [{polygon_m: [[0, 0], [1, 0], [2, 2]], height_m: [1, 0]}]"));
+    mission("keep_out_bare", &map("keep_out: [[[0, 0], [1, 0], [2, 2]]]"));
+    mission("keep_out_two_corners", &map("keep_out: [{polygon_m: [[0, 0], [1, 0]]}]"));
+    mission("box_upside_down", &map("boxes: [{min_m: [0, 0, 1], max_m: [1, 1, 0]}]"));
+    mission("box_key", &map("boxes: [{min: [0, 0, 0], max_m: [1, 1, 1]}]"));
     mission("unknown_word", &with("map: {file: a.pcd, unknown: ocupied}"));
     mission("sampling_word", &with("sampling: traced"));
     mission("time_law_word", &with("time_law: fastest"));

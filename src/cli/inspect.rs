@@ -131,6 +131,8 @@ fn of_map(args: &InspectArgs, path: &Path) -> Result<Understood, Diagnostics> {
         height: Some(height),
         unknown: Unknown::Occupied,
         origin: None,
+        keep_out: Vec::new(),
+        boxes: Vec::new(),
     };
     let beside = file.beside.as_ref().map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
     let inputs = MapInputs { name: &file.name, bytes: &file.bytes, beside };

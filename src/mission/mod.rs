@@ -3,12 +3,15 @@
 mod fields;
 pub(crate) mod limits;
 mod read;
+mod solids;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::diag::{Diagnostics, Source, Span, json_schema};
+use crate::geom::Aabb;
+pub use solids::KeepOut;
 
 /// A mission, as written plus defaults. File names are as written, relative to the mission's folder.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,6 +103,17 @@ pub struct MapSpec {
     pub unknown: Unknown,
     /// Lower corner of a `.npy` grid.
     pub origin: Option<[f64; 3]>,
+    /// Areas that count as obstacles.
+    pub keep_out: Vec<KeepOut>,
+    /// Boxes that count as obstacles, m.
+    pub boxes: Vec<Aabb>,
+}
+
+impl MapSpec {
+    /// Whether the robot's height decides which cells are occupied.
+    pub fn ends_at_the_robot(&self) -> bool {
+        self.height.is_none() || self.keep_out.iter().any(|area| area.height.is_none())
+    }
 }
 
 /// What unseen space counts as.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::fields::{MISSION, PARAMETERISATIONS, PATH, POSE, SAMPLING_LAWS, TIME_LAWS};
 use super::{
     MapSpec, Mission, MissionSpans, NamedJoint, Parameterisation, PathSpec, PoseSpec, Sampling, TimeLaw, Unknown,
-    limits,
+    limits, solids,
 };
 use crate::diag::shape::Field;
 use crate::diag::yaml::{Entry, Node};
@@ -65,7 +65,7 @@ fn path(node: Option<&Node>) -> Option<PathBuf> {
     node?.text().map(PathBuf::from)
 }
 
-fn numbers<const N: usize>(node: &Node) -> Option<[f64; N]> {
+pub(super) fn numbers<const N: usize>(node: &Node) -> Option<[f64; N]> {
     let values: Option<Vec<f64>> = node.items().iter().map(Node::number).collect();
     values?.try_into().ok()
 }
@@ -80,6 +80,8 @@ fn map(node: &Node) -> MapSpec {
             _ => Unknown::Occupied,
         },
         origin: node.get("origin_m").and_then(numbers),
+        keep_out: solids::keep_outs(node),
+        boxes: solids::boxes(node),
     }
 }
 
@@ -165,6 +167,9 @@ impl Between<'_> {
             self.given_path(&mut faults);
         } else {
             self.search(&mut faults);
+        }
+        if let Some(map) = self.root.get("map") {
+            faults.extend(solids::check(self.source, map));
         }
         if let Some(height) = self.root.get("map").and_then(|m| m.get("height_m"))
             && let Some([low, high]) = numbers(height)

@@ -15,6 +15,8 @@ map:
   height_m: [0.02, 1.0]
   unknown: free
   origin_m: [1, 2, 3]
+  keep_out: [{polygon_m: [[0, 0], [1, 0], [1, 2]], height_m: [0.1, 0.5]}]
+  boxes: [{min_m: [0, 1, 2], max_m: [3, 4, 5]}]
 start: {x_m: 0.5, y_m: -0.5, yaw: 180deg, joints: {blade: 90deg, lift: 0.1}}
 goal: {x_m: 9.0, y_m: 8.0, yaw: 1.5, joints: {blade: 0}}
 clearance_m: 0.1
@@ -66,6 +68,8 @@ fn every_key_is_read() {
         height: Some([0.02, 1.0]),
         unknown: Unknown::Free,
         origin: Some([1.0, 2.0, 3.0]),
+        keep_out: vec![KeepOut { polygon: vec![[0.0, 0.0], [1.0, 0.0], [1.0, 2.0]], height: Some([0.1, 0.5]) }],
+        boxes: vec![Aabb { min: [0.0, 1.0, 2.0], max: [3.0, 4.0, 5.0] }],
     };
     assert_eq!(mission.map, Some(map));
     let start = mission.start.expect("start");
