@@ -93,7 +93,10 @@ fn wrong_keys() {
     mission("no_value", &with("goal:"));
     mission("no_space_in_braces", &with("goal: {x_m:9.0, y_m: 8.0}"));
     mission("decimal_comma", &with("goal: {x_m: 9,5, y_m: 8.0}"));
-    mission("via", &with("via: [{x_m: 4.0, y_m: 4.0}]"));
+    mission("via", &with("via: {x_m: 4.0, y_m: 4.0}"));
+    mission("via_keys", &with("via: [{x_m: 4.0, dwell: 2}]"));
+    mission("via_dwell", &with("via: [{x_m: 4.0, y_m: 4.0, dwell_s: -1}]"));
+    mission("via_and_path", "robot: r.yaml\nvia: [{x_m: 4.0, y_m: 4.0}]\npath: {file: a.csv}\n");
     mission("unknown_limit", &with("limits: {wheel: {speed: 0.5}, joints: {blade: {sped: 1.0}}}"));
 }
 

@@ -35,11 +35,9 @@ pub(super) static MISSION: [Field; 14] = [
     ),
     Field::optional(
         "via",
-        Shape::Later(
-            "a later version will drive through given points; until then remove it, or write one mission a stretch",
-        ),
+        Shape::List { item: &VIA, count: (1, 1000), form: "a list of places `{x_m: ..., y_m: ...}`, at least one" },
         "[{x_m: 4.0, y_m: 4.0}]",
-        "points to drive through",
+        "places to stop at on the way, in order; yaw or joints left out are the compiler's choice",
     ),
     Field::optional(
         "clearance_m",
@@ -157,6 +155,30 @@ pub(super) static POSE: [Field; 4] = [
         Shape::Named(&Shape::Angle(Bounds::any("rad or m"))),
         "{blade: 90deg}",
         "joint positions by name: radians, metres or degrees",
+    ),
+];
+
+static VIA: Shape = Shape::Table(&STOP);
+static STOP: [Field; 5] = [
+    Field::required("x_m", METRES, "4.0", "metres, map frame"),
+    Field::required("y_m", METRES, "4.0", "metres, map frame"),
+    Field::optional(
+        "yaw",
+        Shape::Angle(Bounds::any("rad")),
+        "90deg",
+        "heading, radians or degrees, counter-clockwise from x; left out: as it comes",
+    ),
+    Field::optional(
+        "joints",
+        Shape::Named(&Shape::Angle(Bounds::any("rad or m"))),
+        "{blade: 90deg}",
+        "joint positions by name: radians, metres or degrees; left out: as they come",
+    ),
+    Field::optional(
+        "dwell_s",
+        Shape::Number(Bounds::between(0.0, 86_400.0, "s")),
+        "2.0",
+        "how long to stand there at least, seconds; default 0",
     ),
 ];
 

@@ -33,6 +33,9 @@ limits:
 path: {bezier: [[[0, 0], [2, 0], [4, 2], [4, 4]], [[4, 4], [4, 5], [4, 6], [4, 7]]]}
 ";
 
+/// Not together with a given path, which [`FULL`] has.
+const VIA: &str = "via: [{x_m: 4.0, y_m: 4.5, yaw: 90deg, joints: {blade: 1}, dwell_s: 2}, {x_m: 5.0, y_m: 6.0}]\n";
+
 const LEAST: &str = "robot: r.urdf\nmap: {file: m.pcd}\nstart: {x_m: 1, y_m: 2, yaw: 0}\ngoal: {x_m: 3, y_m: 4}\n";
 
 fn good(text: &str) -> Mission {
@@ -94,6 +97,17 @@ fn every_key_is_read() {
 }
 
 #[test]
+fn stops_on_the_way_are_read_in_their_order() {
+    let mission = good(&format!("{LEAST}{VIA}"));
+    let [first, second] = &mission.via[..] else { panic!("{:?}", mission.via) };
+    assert_eq!((first.place.x, first.place.y, first.place.yaw), (Some(4.0), Some(4.5), Some(FRAC_PI_2)));
+    assert_eq!((first.place.joints["blade"], first.dwell), (1.0, 2.0));
+    assert_eq!((second.place.x, second.place.yaw, second.dwell), (Some(5.0), None, 0.0));
+    assert_eq!((mission.spans.via.len(), mission.spans.joints[0].under.as_str()), (2, "via[0]"));
+    assert_eq!(codes("robot: r\nvia: [{x_m: 1, y_m: 1}]\npath: {file: a.csv}\n"), ["mission/via-and-path"]);
+}
+
+#[test]
 fn laws_of_the_distance_driven_get_curves_that_stand_nowhere_unless_told_otherwise() {
     let with = |lines: &str| good(&format!("{LEAST}{lines}")).parameterisation;
     for law in ["eq5", "fixed_point", "printed"] {
@@ -127,7 +141,7 @@ fn a_later_stage_can_point_at_what_it_refuses() {
     assert_eq!(text(&mission.spans.map_file), "../maps/arch.npy");
     assert_eq!(text(&mission.spans.map_resolution), "0.1");
     assert_eq!(text(&mission.spans.robot), "../robots/scr_db/robot.yaml");
-    let joints: Vec<(&str, &str)> = mission.spans.joints.iter().map(|j| (j.name.as_str(), j.under)).collect();
+    let joints: Vec<(&str, &str)> = mission.spans.joints.iter().map(|j| (j.name.as_str(), j.under.as_str())).collect();
     assert_eq!(joints, [("blade", "start"), ("lift", "start"), ("blade", "goal"), ("blade", "limits.joints")]);
     assert!(mission.spans.joints.iter().all(|j| text(&Some(j.at.clone())) == j.name));
 }
@@ -179,6 +193,10 @@ fn tables(path: Vec<&'static str>, table: &'static [Field], out: &mut Vec<(Vec<&
                 path.push("any_name");
                 tables(path, inner, out);
             }
+            Shape::List { item: Shape::Table(inner), .. } => {
+                path.push("an_item");
+                tables(path, inner, out);
+            }
             _ => {}
         }
     }
@@ -196,6 +214,7 @@ fn the_schema_has_exactly_the_keys_that_the_parser_knows() {
     for (path, table) in all_tables() {
         let object = path.iter().fold(&schema, |at, key| match *key {
             "any_name" => &at["additionalProperties"],
+            "an_item" => &at["items"],
             key => &at["properties"][key],
         });
         assert_eq!(object["additionalProperties"], false, "{path:?}");
@@ -210,10 +229,14 @@ fn the_schema_has_exactly_the_keys_that_the_parser_knows() {
 
 #[test]
 fn the_mission_with_every_key_has_every_key() {
-    let source = Arc::new(Source { name: "a".into(), text: FULL.into() });
+    let source = Arc::new(Source { name: "a".into(), text: FULL.to_string() + VIA });
     let root = yaml::load(&source).expect("yaml");
     for (path, table) in all_tables() {
-        let node = path.iter().try_fold(&root, |at, key| at.get(if *key == "any_name" { "blade" } else { key }));
+        let node = path.iter().try_fold(&root, |at, key| match *key {
+            "any_name" => at.get("blade"),
+            "an_item" => at.items().first(),
+            key => at.get(key),
+        });
         let node = node.unwrap_or_else(|| panic!("{path:?}"));
         for field in table.iter().filter(|f| !matches!(f.shape, Shape::Later(_))) {
             // Two ways to give a path; this mission has the other one.
@@ -228,7 +251,7 @@ fn every_example_in_the_documentation_of_a_key_is_good() {
         for field in table.iter().filter(|f| !matches!(f.shape, Shape::Later(_))) {
             let mut text = format!("{{{}: {}}}", field.key, field.example);
             for key in path.iter().rev() {
-                text = format!("{{{key}: {text}}}");
+                text = if *key == "an_item" { format!("[{text}]") } else { format!("{{{key}: {text}}}") };
             }
             let faults = parse("a.yaml", &text).err().map_or(Vec::new(), |f| f.0);
             let wrong: Vec<_> = faults
