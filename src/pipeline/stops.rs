@@ -3,10 +3,10 @@
 use super::plan::{note, optimise, route};
 use super::{CompileOptions, Finish, Made, Place, Run, place_of, refused, start_of, vias};
 use crate::certify::{self, Task};
-use crate::command::CommandTable;
+use crate::command::{CommandError, CommandTable, MOST_ROWS};
 use crate::diag::{Describe, Diagnostics};
 use crate::geom::Pose2;
-use crate::mission::{Mission, PoseSpec, Sampling};
+use crate::mission::{Mission, PoseSpec, Sampling, ViaSpec};
 use crate::retime::{self, RetimeOptions};
 use crate::robot::RobotModel;
 use crate::search::{Query, SearchPath};
@@ -46,7 +46,7 @@ pub(super) fn plan(
         };
         let path = route(run, finish, map, compile, &query).map_err(|error| {
             let about = if error.is_about_start() { index } else { index + 1 };
-            of_stretch(mission, index, about, error.diagnostic().into())
+            of_stretch(finish, index, about, error.diagnostic().into())
         })?;
         let so_far = joined_paths(route_so_far.take(), &path);
         note(run, &so_far, robot);
@@ -56,16 +56,19 @@ pub(super) fn plan(
             let goal = place_of(place, robot);
             Task { start, start_joints, goal, clearance: mission.clearance, reverse: mission.reverse }
         });
-        let made = made.map_err(|faults| of_stretch(mission, index, index + 1, faults))?;
+        let made = made.map_err(|faults| of_stretch(finish, index, index + 1, faults))?;
         if !made.certificate.holds() {
             let why = refused(&made.certificate, made.trajectory.source);
             run.traces.refused = Some(made.commands);
-            return Err(of_stretch(mission, index, index + 1, why.into()));
+            return Err(of_stretch(finish, index, index + 1, why.into()));
         }
         from = end_of(&made.commands, robot);
         stretches.push((made, path.length() > 0.0));
     }
-    let commands = joined_commands(mission, stretches.iter().map(|(made, _)| &made.commands));
+    let commands = joined_commands(mission, stretches.iter().map(|(made, _)| &made.commands)).map_err(|error| {
+        let hint = "a shorter `dwell_s`, or a longer `sampling_time_s`";
+        error.diagnostic().maybe_at(mission.spans.via.first()).hint(hint)
+    })?;
     let trajectory = joined_trajectories(&stretches);
     // For its figures and the path error; the commands are those of the stretches, so that rests begin and end with a row.
     let options = RetimeOptions { law: finish.law(&trajectory), sampling_time: finish.sampling_time };
@@ -94,7 +97,8 @@ fn end_of(table: &CommandTable, robot: &RobotModel) -> From {
 }
 
 /// Says of a fault which stretch it is about, and points at one of the places: 0 is the start, 1 the first via.
-fn of_stretch(mission: &Mission, stretch: usize, about: usize, faults: Diagnostics) -> Diagnostics {
+fn of_stretch(finish: &Finish<'_>, stretch: usize, about: usize, faults: Diagnostics) -> Diagnostics {
+    let (mission, joints) = (finish.mission, finish.robot.joints.len());
     let name = |place: usize| match place {
         0 => "the start".to_owned(),
         via if via <= mission.via.len() => format!("`via[{}]`", via - 1),
@@ -105,9 +109,15 @@ fn of_stretch(mission: &Mission, stretch: usize, about: usize, faults: Diagnosti
         0 => spans.start.as_ref(),
         via => spans.via.get(via - 1).or(spans.goal.as_ref()),
     };
+    // What the stretch before settled may be what blocks this one.
+    let open = |via: &&ViaSpec| via.place.yaw.is_none() || via.place.joints.len() < joints;
+    let left_open = stretch.checked_sub(1).and_then(|via| mission.via.get(via)).filter(open).is_some();
     let on = format!("from {} to {}", name(stretch), name(stretch + 1));
     let said = faults.0.into_iter().map(|mut fault| {
         fault.message = format!("on the stretch {on}: {}", fault.message);
+        if let Some(hint) = fault.hint.as_mut().filter(|_| left_open && fault.code == "search/no-way") {
+            *hint += &format!("; or say which heading and joints {} shall have", name(stretch));
+        }
         fault.maybe_at(span).number("stretch", stretch as u64)
     });
     Diagnostics(said.collect())
@@ -122,21 +132,29 @@ fn joined_paths(before: Option<SearchPath>, path: &SearchPath) -> SearchPath {
     whole
 }
 
-fn joined_commands<'a>(mission: &Mission, tables: impl Iterator<Item = &'a CommandTable>) -> CommandTable {
+fn joined_commands<'a>(
+    mission: &Mission,
+    tables: impl Iterator<Item = &'a CommandTable>,
+) -> Result<CommandTable, CommandError> {
     let mut tables = tables.cloned();
     let mut whole = tables.next().expect("a mission has a goal, so there is a stretch");
     for (table, via) in tables.zip(&mission.via) {
-        let rests = (via.dwell / whole.sampling_time - 1e-9).ceil() as usize;
+        let hold = whole.sampling_time;
+        let rests = ((via.dwell / hold - 1e-9).ceil() as usize).max(LEAST_REST);
+        let rows = (whole.rows.len() + rests + table.rows.len()) as f64;
+        if rows > MOST_ROWS {
+            return Err(CommandError::TooLong { time: rows * hold, sampling_time: hold, rows });
+        }
         let rest = whole.rows[whole.rows.len() - 1].clone();
         // The last row of a table is one of them.
-        whole.rows.extend(std::iter::repeat_n(rest, rests.max(LEAST_REST) - 1));
+        whole.rows.extend(std::iter::repeat_n(rest, rests - 1));
         whole.rows.extend(table.rows);
         if table.sampling != whole.sampling {
             // `tracked` is promised of all rows or of none.
             whole.sampling = Sampling::Mean;
         }
     }
-    whole
+    Ok(whole)
 }
 
 /// `driven`: whether a stretch goes anywhere; of one that does not nothing could be optimised.

@@ -97,4 +97,8 @@ fn areas_and_boxes_of_the_mission_are_driven_around_and_are_in_the_proof() {
     }
     let both = with(&format!("{south}\n  {north}"));
     assert!(both.run(&["compile", "missions/a.yaml"]).expect(1).stderr.contains("no way to the goal"));
+    both.edit("missions/a.yaml", "goal:", "via: [{x_m: 0.8, y_m: 2.4}]\ngoal:");
+    let after_a_stop = both.run(&["compile", "missions/a.yaml"]).expect(1).stderr;
+    assert!(after_a_stop.contains("on the stretch from `via[0]` to the goal: no way"), "{after_a_stop}");
+    assert!(after_a_stop.contains("or say which heading and joints `via[0]` shall have"), "{after_a_stop}");
 }
