@@ -2,27 +2,28 @@
 
 mod check;
 mod place;
+mod plan;
+mod stops;
 mod world;
 
 pub use check::{check, path_error_of_commands};
 pub use place::Place;
+pub use plan::{OPTIMISER_MARGINS, SEARCH_MARGIN};
 pub use world::world;
 
 use std::time::Instant;
 
-use crate::certify::{self, Certificate, Goal, RefusalKind, Task};
+use crate::certify::{self, Certificate, Goal, RefusalKind, Task, Via};
 use crate::command::{self, CommandTable, SampleOptions};
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::geom::{Pose2, wrap_angle};
 use crate::map::VoxelMap;
-use crate::mission::{Mission, Parameterisation, PathSpec, PoseSpec};
-use crate::optimize::{self, OptimizeOptions};
-use crate::report::schema::{InitialPart, ProfilePart, SearchPart, TrajectoryPart};
+use crate::mission::{Mission, Parameterisation, PathSpec, PoseSpec, TimeLaw};
 use crate::report::schema::{InputFile, InputsPart};
+use crate::report::schema::{ProfilePart, TrajectoryPart};
 use crate::report::{Report, metrics, path_error};
 use crate::retime::{self, MotionProfile, RetimeOptions};
 use crate::robot::{Files, RobotModel, spec::RobotSpec};
-use crate::search::{self, Query, SearchError, SearchOptions};
 use crate::trajectory::{Leg, Trajectory, TrajectorySource, given, steered_curve::SteeredCurve};
 
 /// A text file that was read.
@@ -135,19 +136,6 @@ pub struct World {
     pub map: Option<Place>,
 }
 
-/// Clearance beyond what must be certified that the search asks for first, m: what held commands may leave of a path.
-pub const SEARCH_MARGIN: f64 = 2e-3;
-/// Clearance beyond what must be certified that the optimiser aims at, m, one try after the other.
-pub const OPTIMISER_MARGINS: [f64; 3] = [0.01, 0.02, 0.04];
-/// The same at first where the optimiser looks at a motion only now and then.
-const FIRST_MARGIN: f64 = 0.013;
-
-/// What a motion has missed of its clearance is asked for so many times over by the next tries: between its nodes the distance field
-/// says up to a quarter of a cell too much.
-const MISSED_TIMES: f64 = 1.5;
-/// What counts of it at most, m.
-const MISSED_MOST: f64 = 0.015;
-
 /// Collects figures while the stages run.
 struct Run<'a> {
     report: Report,
@@ -245,7 +233,7 @@ fn stages(
     let finish = Finish { mission, robot, map: map.as_deref(), sampling_time };
     let made = match (given, map) {
         (Some(trajectory), _) => finish.certify(run, trajectory)?,
-        (None, Some(map)) => plan(run, &finish, map, options)?,
+        (None, Some(map)) => plan::plan(run, &finish, map, options)?,
         (None, None) => {
             let message = "the mission has neither a map nor a path of its own";
             return Err(Diagnostic::error("mission/no-map", message).into());
@@ -286,76 +274,6 @@ struct Made {
     certificate: Certificate,
 }
 
-/// How a try of the optimiser goes about it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Look {
-    /// From the path.
-    First,
-    /// More closely, from the motion of the try before.
-    Again,
-    /// More closely, from the path.
-    Closer,
-}
-
-/// Searches and optimises until something is certified; the search's own path is the last try.
-fn plan(run: &mut Run<'_>, finish: &Finish<'_>, map: &Place, compile: &CompileOptions) -> Result<Made, Diagnostics> {
-    let asked = compile.parameterisation.unwrap_or(finish.mission.parameterisation);
-    let (mission, robot) = (finish.mission, finish.robot);
-    let field = run.stage("esdf", || map.field(compile.threads));
-    let query = query(mission, robot);
-    let found = run.stage("search", || {
-        let options = |margin: f64| SearchOptions { clearance: mission.clearance + margin, reverse: mission.reverse };
-        // What fits only without the margin is found too, and what is absent is absent without it.
-        search::search(map, field, robot, &query, &options(SEARCH_MARGIN)).or_else(|error| match error {
-            SearchError::OffMap { .. } | SearchError::Limit { .. } | SearchError::Sampled { .. } => Err(error),
-            _ => search::search(map, field, robot, &query, &options(0.0)),
-        })
-    });
-    let path = found.map_err(|error| place_search_error(mission, &error))?;
-    run.report.search = Some(SearchPart::from(&path));
-    run.traces.route = path.states.iter().map(|state| [state.pose.x, state.pose.y]).collect();
-    run.report.initial = Some(InitialPart { metrics: metrics::of_search(&path, robot) });
-    if path.length() == 0.0 {
-        return finish.certify(run, path.trajectory());
-    }
-    // Where one parameterisation fails at every margin, the other may not.
-    let other = (asked == Parameterisation::ArcLength).then_some(Parameterisation::Flat);
-    // A motion that misses its clearance by little is looked at more closely, then from the beginning, then asked for more.
-    let of = |p: Parameterisation| match p {
-        Parameterisation::Flat => OPTIMISER_MARGINS.map(|margin| (p, margin, Look::First)).to_vec(),
-        Parameterisation::ArcLength => {
-            let closer = OPTIMISER_MARGINS.map(|margin| (p, margin, Look::Closer));
-            [(p, FIRST_MARGIN, Look::First), (p, FIRST_MARGIN, Look::Again)].into_iter().chain(closer).collect()
-        }
-    };
-    let mut refused: Option<Trajectory> = None;
-    let mut missed = 0.0f64;
-    let tries = [asked].into_iter().chain(other).flat_map(of);
-    for (parameterisation, margin, look) in tries {
-        let usual = if compile.spins { OptimizeOptions::default() } else { OptimizeOptions::without_spins() };
-        let clearance = mission.clearance + margin;
-        let mut options = OptimizeOptions { parameterisation, clearance, dense: compile.dense, ..usual };
-        if look != Look::First {
-            options.steer = options.steer.closer();
-            options.clearance += MISSED_TIMES * missed;
-        }
-        let trajectory = run.stage("optimize", || match refused.take().filter(|_| look == Look::Again) {
-            Some(refused) => optimize::resume(&path, field, robot, &options, &refused),
-            None => optimize::optimize(&path, field, robot, &options),
-        });
-        refused = Some(trajectory.clone());
-        // A trajectory that no law can time is one more reason to go on to the next try.
-        let Ok(made) = finish.certify(run, trajectory) else { continue };
-        if made.certificate.holds() {
-            return Ok(made);
-        }
-        if let Some(closest) = &made.certificate.closest {
-            missed = missed.max((mission.clearance - closest.distance).clamp(0.0, MISSED_MOST));
-        }
-    }
-    finish.certify(run, path.trajectory())
-}
-
 /// What comes after planning: time law, sampling, proof, path error.
 struct Finish<'a> {
     mission: &'a Mission,
@@ -367,18 +285,27 @@ struct Finish<'a> {
 impl Finish<'_> {
     /// The judged motion; its certificate may refuse.
     fn certify(&self, run: &mut Run<'_>, trajectory: Trajectory) -> Result<Made, Diagnostics> {
-        // The search's path has no timing of its own.
-        let law = match (self.mission.time_law, trajectory.source) {
-            (crate::mission::TimeLaw::Minco, TrajectorySource::Search) => crate::mission::TimeLaw::Auto,
-            (law, _) => law,
-        };
-        let options = RetimeOptions { law, sampling_time: self.sampling_time };
+        let task = self.task(&trajectory);
+        self.certify_task(run, trajectory, &task)
+    }
+
+    /// The same of a task that is not the mission's.
+    fn certify_task(&self, run: &mut Run<'_>, trajectory: Trajectory, task: &Task) -> Result<Made, Diagnostics> {
+        let options = RetimeOptions { law: self.law(&trajectory), sampling_time: self.sampling_time };
         let profile = run.stage("retime", || retime::retime(&trajectory, self.robot, &options))?;
         let options = SampleOptions { sampling_time: self.sampling_time, sampling: self.mission.sampling };
         let commands = run.stage("command", || command::sample(&profile, self.robot, &options))?;
-        let task = self.task(&trajectory);
-        let certificate = run.stage("certify", || certify::certify(&commands, self.robot, self.map, &task));
+        let certificate = run.stage("certify", || certify::certify(&commands, self.robot, self.map, task));
         Ok(Made { trajectory, profile, commands, certificate })
+    }
+
+    /// The mission's time law, where it can time this trajectory.
+    fn law(&self, trajectory: &Trajectory) -> TimeLaw {
+        match (self.mission.time_law, trajectory.source) {
+            // The search's path has no timing of its own.
+            (TimeLaw::Minco, TrajectorySource::Search) => TimeLaw::Auto,
+            (law, _) => law,
+        }
     }
 
     fn task(&self, trajectory: &Trajectory) -> Task {
@@ -466,26 +393,19 @@ fn goal(mission: &Mission, robot: &RobotModel, given_end: Option<Pose2>) -> Goal
     }
 }
 
-/// What the search is asked.
-fn query(mission: &Mission, robot: &RobotModel) -> Query {
-    let [start, goal] = [&mission.start, &mission.goal].map(|p| p.clone().unwrap_or_default());
-    let pose = |p: &PoseSpec| Pose2::new(p.x.unwrap_or(0.0), p.y.unwrap_or(0.0), p.yaw.unwrap_or(0.0));
-    let joints = |p: &PoseSpec| robot.joints.iter().map(|j| p.joints.get(&j.name).copied()).collect();
-    Query {
-        start: pose(&start),
-        start_joints: joints(&start),
-        goal: pose(&goal),
-        goal_yaw: goal.yaw,
-        goal_joints: joints(&goal),
+/// A place as the certificate is asked for it; its position is there.
+fn place_of(place: &PoseSpec, robot: &RobotModel) -> Goal {
+    Goal {
+        x: place.x.unwrap_or_default(),
+        y: place.y.unwrap_or_default(),
+        yaw: place.yaw,
+        joints: robot.joints.iter().map(|joint| place.joints.get(&joint.name).copied()).collect(),
     }
 }
 
-/// Points a search error at the pose it is about.
-fn place_search_error(mission: &Mission, error: &SearchError) -> Diagnostics {
-    use crate::diag::Describe;
-    let spans = &mission.spans;
-    let span = if error.is_about_start() { spans.start.as_ref() } else { spans.goal.as_ref() };
-    error.diagnostic().maybe_at(span).into()
+/// Where the commands must stop on the way.
+fn vias(mission: &Mission, robot: &RobotModel) -> Vec<Via> {
+    mission.via.iter().map(|via| Via { place: place_of(&via.place, robot), dwell: via.dwell }).collect()
 }
 
 /// The mission's own path as a trajectory.

@@ -19,3 +19,5 @@ mod inspect;
 mod robot;
 #[path = "cli/sandbox.rs"]
 mod sandbox;
+#[path = "cli/stops.rs"]
+mod stops;

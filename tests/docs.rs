@@ -278,6 +278,10 @@ fn keys(schema: &serde_json::Value, into: &mut Vec<String>) {
     if schema["additionalProperties"].is_object() {
         keys(&schema["additionalProperties"], into);
     }
+    // Lists of tables.
+    if schema["items"].is_object() {
+        keys(&schema["items"], into);
+    }
 }
 
 #[test]

@@ -93,7 +93,10 @@ fn wrong_keys() {
     mission("no_value", &with("goal:"));
     mission("no_space_in_braces", &with("goal: {x_m:9.0, y_m: 8.0}"));
     mission("decimal_comma", &with("goal: {x_m: 9,5, y_m: 8.0}"));
-    mission("via", &with("via: [{x_m: 4.0, y_m: 4.0}]"));
+    mission("via", &with("via: {x_m: 4.0, y_m: 4.0}"));
+    mission("via_keys", &with("via: [{x_m: 4.0, dwell: 2}]"));
+    mission("via_dwell", &with("via: [{x_m: 4.0, y_m: 4.0, dwell_s: -1}]"));
+    mission("via_and_path", "robot: r.yaml\nvia: [{x_m: 4.0, y_m: 4.0}]\npath: {file: a.csv}\n");
     mission("unknown_limit", &with("limits: {wheel: {speed: 0.5}, joints: {blade: {sped: 1.0}}}"));
 }
 
@@ -112,6 +115,13 @@ fn wrong_values() {
     mission("resolution", &with("map: {file: a.pcd, resolution_m: 0}"));
     mission("height_crossed", &with("map: {file: a.pcd, height_m: [1.0, 0.02]}"));
     mission("height_count", &with("map: {file: a.pcd, height_m: [1.0]}"));
+    let map = |added: &str| with(&format!("map: {{file: a.pcd, {added}}}"));
+    mission("keep_out_line", &map("keep_out: [{polygon_m: [[0, 0], [1, 1], [2, 2]]}]"));
+    mission("keep_out_height", &map("keep_out: [{polygon_m: [[0, 0], [1, 0], [2, 2]], height_m: [1, 0]}]"));
+    mission("keep_out_bare", &map("keep_out: [[[0, 0], [1, 0], [2, 2]]]"));
+    mission("keep_out_two_corners", &map("keep_out: [{polygon_m: [[0, 0], [1, 0]]}]"));
+    mission("box_upside_down", &map("boxes: [{min_m: [0, 0, 1], max_m: [1, 1, 0]}]"));
+    mission("box_key", &map("boxes: [{min: [0, 0, 0], max_m: [1, 1, 1]}]"));
     mission("unknown_word", &with("map: {file: a.pcd, unknown: ocupied}"));
     mission("sampling_word", &with("sampling: traced"));
     mission("time_law_word", &with("time_law: fastest"));

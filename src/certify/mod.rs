@@ -14,6 +14,7 @@ mod simplex;
 mod table;
 #[cfg(test)]
 mod tests;
+mod vias;
 
 use rollout::Rollout;
 pub use series::{Instant, distances};
@@ -56,6 +57,26 @@ pub struct Goal {
     pub joints: Vec<Option<f64>>,
 }
 
+/// A place on the way at which the robot must stand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Via {
+    /// Where; within the goal's tolerances.
+    pub place: Goal,
+    /// For how long at least, s; 0: at one row, at rest.
+    pub dwell: f64,
+}
+
+/// How a via was reached.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reached {
+    /// When the robot first stands there, s.
+    pub time: f64,
+    /// m.
+    pub point_error: f64,
+    /// rad; `None` where the via leaves the heading open.
+    pub heading_error: Option<f64>,
+}
+
 /// The verdict, with the figures it rests on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Certificate {
@@ -72,6 +93,8 @@ pub struct Certificate {
     pub end_point_error: f64,
     /// rad; `None` where the goal leaves the heading open.
     pub end_heading_error: Option<f64>,
+    /// Each via in order, as far as they were reached.
+    pub vias: Vec<Reached>,
     /// Peaks of every actuator, as written.
     pub limits: Vec<LimitCheck>,
     /// Whether no limit (speed, acceleration, jerk, joint position) is exceeded.
@@ -122,6 +145,8 @@ pub enum RefusalKind {
     Reverse,
     /// Does not end at the goal, or not at rest.
     End,
+    /// Does not stop at a via.
+    Via,
     /// The table contradicts itself or is not finite.
     Table,
 }
@@ -172,6 +197,17 @@ pub fn clearance_proven(table: &CommandTable, robot: &RobotModel, map: &VoxelMap
 /// A table that cannot be replayed (no rows, numbers that are not finite, joints that are not the robot's) is refused with
 /// [`RefusalKind::Table`] and without figures: errors infinite, no peaks, clearance zero.
 pub fn certify(table: &CommandTable, robot: &RobotModel, map: Option<&VoxelMap>, task: &Task) -> Certificate {
+    certify_through(table, robot, map, task, &[])
+}
+
+/// The same, and that the robot stands at each of these places, in their order.
+pub fn certify_through(
+    table: &CommandTable,
+    robot: &RobotModel,
+    map: Option<&VoxelMap>,
+    task: &Task,
+    vias: &[Via],
+) -> Certificate {
     let mut certificate = Certificate {
         clearance_required: map.map(|_| task.clearance),
         clearance_proven: map.map(|_| 0.0),
@@ -179,6 +215,7 @@ pub fn certify(table: &CommandTable, robot: &RobotModel, map: Option<&VoxelMap>,
         own_links: None,
         end_point_error: f64::INFINITY,
         end_heading_error: task.goal.yaw.map(|_| f64::INFINITY),
+        vias: Vec::new(),
         limits: Vec::new(),
         limits_hold: false,
         refusals: table::unreadable(table, robot, task),
@@ -203,6 +240,9 @@ pub fn certify(table: &CommandTable, robot: &RobotModel, map: Option<&VoxelMap>,
     certificate.end_point_error = ends.point;
     certificate.end_heading_error = ends.heading;
     certificate.refusals.extend(ends.refusals);
+    let (reached, missed) = vias::vias(&rollout, &table::standing(table), robot, vias);
+    certificate.vias = reached;
+    certificate.refusals.extend(missed);
 
     if let Some((links, refusal)) = own_links::own_links(&rollout, robot) {
         certificate.own_links = Some(links);

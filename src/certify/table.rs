@@ -92,6 +92,14 @@ pub(super) fn unreadable(table: &CommandTable, robot: &RobotModel, task: &Task) 
     faults
 }
 
+/// Of each row, whether nothing moves while it is held.
+pub(super) fn standing(table: &CommandTable) -> Vec<bool> {
+    let still = |row: &crate::command::CommandRow| {
+        [row.wheel_left, row.wheel_right].iter().chain(&row.joint_velocities).all(|speed| *speed == 0.0)
+    };
+    table.rows.iter().map(still).collect()
+}
+
 /// Where the table contradicts the task, itself or its replay.
 pub(super) fn contradictions(
     table: &CommandTable,

@@ -5,3 +5,4 @@ mod faults;
 mod own_links;
 pub(crate) mod peer;
 pub(crate) mod robots;
+mod vias;

@@ -131,6 +131,8 @@ fn of_map(args: &InspectArgs, path: &Path) -> Result<Understood, Diagnostics> {
         height: Some(height),
         unknown: Unknown::Occupied,
         origin: None,
+        keep_out: Vec::new(),
+        boxes: Vec::new(),
     };
     let beside = file.beside.as_ref().map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
     let inputs = MapInputs { name: &file.name, bytes: &file.bytes, beside };
@@ -157,7 +159,9 @@ fn of_mission(path: &Path) -> Result<Understood, Diagnostics> {
         let joints: Vec<String> = p.joints.iter().map(|(name, v)| format!("{name} {v}")).collect();
         format!("x {} m, y {} m, yaw {} rad {}", number(p.x), number(p.y), number(p.yaw), joints.join(", "))
     };
-    for (name, spec) in [("start", &mission.start), ("goal", &mission.goal)] {
+    let vias = mission.via.iter().map(|via| ("via", Some(&via.place)));
+    let ends = [("start", mission.start.as_ref())].into_iter().chain(vias).chain([("goal", mission.goal.as_ref())]);
+    for (name, spec) in ends {
         if let Some(spec) = spec {
             out += &format!("  {name:<10} {}\n", pose(spec));
         }

@@ -90,6 +90,9 @@ pub(super) fn mission(mission: &Mission, world: &World) -> Figure {
         view.path(path, "given path");
     }
     place::ends(&mut view, &world.robot, ends);
+    for (index, via) in mission.via.iter().enumerate() {
+        place::stand(&mut view, &world.robot, &via.place, &format!("via[{index}]"));
+    }
     figure(format!("Mission {}", mission.name), view)
 }
 

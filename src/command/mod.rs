@@ -11,7 +11,7 @@ use crate::geom::Pose2;
 use crate::mission::Sampling;
 
 pub use error::CommandError;
-pub use sample::{sample, sample_uncorrected};
+pub use sample::{MOST_ROWS, sample, sample_uncorrected};
 
 /// The command table: what is written to `commands.csv`, no more and no less. Row k is held from `time(k)` to `time(k + 1)`;
 /// the last row is at rest.

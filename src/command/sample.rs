@@ -14,7 +14,7 @@ pub const CORRECT_ANGLE_BEYOND: f64 = 4e-4;
 /// A corrected replay ends at least this near, m.
 const CORRECTED_WITHIN: f64 = 0.05e-3;
 /// More rows are refused.
-const MOST_ROWS: f64 = 2e6;
+pub const MOST_ROWS: f64 = 2e6;
 /// Slow-downs before giving up.
 const ATTEMPTS: usize = 60;
 

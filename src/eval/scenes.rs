@@ -59,6 +59,7 @@ impl SceneSet {
             map: None,
             start: Some(scene.start.clone()),
             goal: Some(scene.goal.clone()),
+            via: Vec::new(),
             path: None,
             clearance: self.clearance,
             sampling_time: SAMPLING_TIME,

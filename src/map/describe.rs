@@ -35,6 +35,9 @@ impl VoxelMap {
         if s.cut > 0 {
             line("cut", format!("{} outside height_m", s.cut));
         }
+        if s.added > 0 {
+            line("added", format!("{} cells by the mission's keep_out and boxes", s.added));
+        }
         if s.unknown > 0 {
             let share = 100.0 * s.unknown as f64 / (nx * ny * nz) as f64;
             line(

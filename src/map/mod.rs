@@ -13,6 +13,7 @@ mod pcd;
 mod pgm;
 mod ply;
 mod points;
+mod solids;
 mod survey;
 #[cfg(test)]
 mod tests;
@@ -67,6 +68,8 @@ pub struct MapStatistics {
     pub cut: usize,
     /// Cells that are occupied only because they are unknown.
     pub unknown: usize,
+    /// Cells that are occupied only because the mission says so: keep-out areas and boxes.
+    pub added: usize,
 }
 
 impl VoxelMap {
@@ -186,6 +189,7 @@ pub fn beside(name: &str, bytes: &[u8]) -> Result<Option<(PathBuf, bool)>, Diagn
 
 /// Reads a map. `robot_height`: top of the robot over all postures, the default of `height_m`'s upper end.
 ///
+/// The mission's keep-out areas and boxes are occupied cells of it like all others.
 /// A map without any obstacle in the slab is legal; one without any finite point is not.
 ///
 /// # Errors
@@ -207,12 +211,18 @@ fn in_file(name: &str, beside: Option<&str>, faults: Vec<MapError>) -> Diagnosti
 }
 
 fn read(inputs: &MapInputs<'_>, spec: &MapSpec, robot_height: f64) -> Result<VoxelMap, Vec<MapError>> {
-    let MapInputs { name, bytes, beside } = *inputs;
     let [low, high] = spec.height.unwrap_or([FLOOR, robot_height.max(FLOOR)]);
     if low.is_nan() || high.is_nan() || low > high {
         return Err(vec![MapError::Slab { low, high }]);
     }
     let slab = Slab { low, high };
+    let map = of_file(inputs, spec, slab)?;
+    solids::added(map, spec, slab, robot_height).map_err(|fault| vec![fault])
+}
+
+/// The map as its file has it.
+fn of_file(inputs: &MapInputs<'_>, spec: &MapSpec, slab: Slab) -> Result<VoxelMap, Vec<MapError>> {
+    let MapInputs { name, bytes, beside } = *inputs;
     if let Some(value) = spec.resolution.filter(|r| !voxelize::usable(*r)) {
         return Err(vec![MapError::Resolution { value, at: None }]);
     }

@@ -3,7 +3,7 @@
 use super::{Parameterisation, Sampling, TimeLaw};
 use crate::diag::shape::{Bounds, Choice, Field, LARGE, Shape};
 
-const METRES: Shape = Shape::Number(Bounds::any("m"));
+pub(super) const METRES: Shape = Shape::Number(Bounds::any("m"));
 /// Shorter than 0.1 ms no controller holds a command, and the table would not fit in memory.
 const SAMPLING_TIME: Shape = Shape::Number(Bounds::between(1e-4, 10.0, "s"));
 
@@ -35,11 +35,9 @@ pub(super) static MISSION: [Field; 14] = [
     ),
     Field::optional(
         "via",
-        Shape::Later(
-            "a later version will drive through given points; until then remove it, or write one mission a stretch",
-        ),
+        Shape::List { item: &VIA, count: (1, 1000), form: "a list of places `{x_m: ..., y_m: ...}`, at least one" },
         "[{x_m: 4.0, y_m: 4.0}]",
-        "points to drive through",
+        "places to stop at on the way, in order; yaw or joints left out are the compiler's choice",
     ),
     Field::optional(
         "clearance_m",
@@ -94,7 +92,7 @@ pub(super) static MISSION: [Field; 14] = [
     Field::optional("path", Shape::Table(&PATH), "{file: path.csv}", "a given path instead of `map` and `goal`"),
 ];
 
-static MAP: [Field; 5] = [
+static MAP: [Field; 7] = [
     Field::required(
         "file",
         Shape::Text,
@@ -125,6 +123,22 @@ static MAP: [Field; 5] = [
         "[0, 0, 0]",
         "lower corner of a .npy grid, metres",
     ),
+    Field::optional(
+        "keep_out",
+        Shape::List { item: &super::solids::KEEP_OUT, count: (0, 1000), form: "a list of areas `{polygon_m: [...]}`" },
+        "[{polygon_m: [[2, 1], [3, 1], [3, 2]]}]",
+        "areas that count as obstacles, the whole height or `height_m` of it",
+    ),
+    Field::optional(
+        "boxes",
+        Shape::List {
+            item: &super::solids::BOX,
+            count: (0, 10_000),
+            form: "a list of boxes `{min_m: ..., max_m: ...}`",
+        },
+        "[{min_m: [2, 1, 0], max_m: [3, 2, 0.5]}]",
+        "boxes that count as obstacles beside those of the file; `height_m` does not cut them",
+    ),
 ];
 
 pub(super) static POSE: [Field; 4] = [
@@ -141,6 +155,30 @@ pub(super) static POSE: [Field; 4] = [
         Shape::Named(&Shape::Angle(Bounds::any("rad or m"))),
         "{blade: 90deg}",
         "joint positions by name: radians, metres or degrees",
+    ),
+];
+
+static VIA: Shape = Shape::Table(&STOP);
+static STOP: [Field; 5] = [
+    Field::required("x_m", METRES, "4.0", "metres, map frame"),
+    Field::required("y_m", METRES, "4.0", "metres, map frame"),
+    Field::optional(
+        "yaw",
+        Shape::Angle(Bounds::any("rad")),
+        "90deg",
+        "heading, radians or degrees, counter-clockwise from x; left out: as it comes",
+    ),
+    Field::optional(
+        "joints",
+        Shape::Named(&Shape::Angle(Bounds::any("rad or m"))),
+        "{blade: 90deg}",
+        "joint positions by name: radians, metres or degrees; left out: as they come",
+    ),
+    Field::optional(
+        "dwell_s",
+        Shape::Number(Bounds::between(0.0, 86_400.0, "s")),
+        "2.0",
+        "how long to stand there at least, seconds; default 0",
     ),
 ];
 
@@ -167,7 +205,8 @@ static PATH_ERROR: [Field; 1] = [Field::required(
     "sampling times to report the path error for, seconds; default 0.01 to 0.5",
 )];
 
-static POINT: Shape = Shape::List { item: &METRES, count: (2, 2), form: "a point [x, y] in metres: 2 numbers" };
+pub(super) static POINT: Shape =
+    Shape::List { item: &METRES, count: (2, 2), form: "a point [x, y] in metres: 2 numbers" };
 static SEGMENT: Shape = Shape::List { item: &POINT, count: (4, 4), form: "a cubic segment of 4 control points [x, y]" };
 
 pub(super) static PATH: [Field; 2] = [

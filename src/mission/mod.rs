@@ -3,12 +3,15 @@
 mod fields;
 pub(crate) mod limits;
 mod read;
+mod solids;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::diag::{Diagnostics, Source, Span, json_schema};
+use crate::geom::Aabb;
+pub use solids::KeepOut;
 
 /// A mission, as written plus defaults. File names are as written, relative to the mission's folder.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,6 +26,8 @@ pub struct Mission {
     pub start: Option<PoseSpec>,
     /// Goal; likewise.
     pub goal: Option<PoseSpec>,
+    /// Where to stop on the way, in order.
+    pub via: Vec<ViaSpec>,
     /// A given path instead of a search.
     pub path: Option<PathSpec>,
     /// What the certificate must prove, metres.
@@ -66,13 +71,15 @@ pub struct MissionSpans {
     pub start: Option<Span>,
     /// `goal` with its value.
     pub goal: Option<Span>,
+    /// Each item of `via`.
+    pub via: Vec<Span>,
     /// `path` with its value.
     pub path: Option<Span>,
     /// The value of `path.file`.
     pub path_file: Option<Span>,
     /// The value of `time_law`.
     pub time_law: Option<Span>,
-    /// Every joint that is named, in the order start, goal, limits.
+    /// Every joint that is named, in the order start, goal, via, limits.
     pub joints: Vec<NamedJoint>,
 }
 
@@ -81,8 +88,8 @@ pub struct MissionSpans {
 pub struct NamedJoint {
     /// As written.
     pub name: String,
-    /// `start`, `goal` or `limits.joints`.
-    pub under: &'static str,
+    /// `start`, `goal`, `via[0]`, … or `limits.joints`.
+    pub under: String,
     /// The name's place.
     pub at: Span,
 }
@@ -100,6 +107,17 @@ pub struct MapSpec {
     pub unknown: Unknown,
     /// Lower corner of a `.npy` grid.
     pub origin: Option<[f64; 3]>,
+    /// Areas that count as obstacles.
+    pub keep_out: Vec<KeepOut>,
+    /// Boxes that count as obstacles, m.
+    pub boxes: Vec<Aabb>,
+}
+
+impl MapSpec {
+    /// Whether the robot's height decides which cells are occupied.
+    pub fn ends_at_the_robot(&self) -> bool {
+        self.height.is_none() || self.keep_out.iter().any(|area| area.height.is_none())
+    }
 }
 
 /// What unseen space counts as.
@@ -122,6 +140,15 @@ pub struct PoseSpec {
     pub yaw: Option<f64>,
     /// Joint values by name: radians or metres.
     pub joints: BTreeMap<String, f64>,
+}
+
+/// A stop on the way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ViaSpec {
+    /// Where. The position is always there.
+    pub place: PoseSpec,
+    /// How long the robot stands there at least, s.
+    pub dwell: f64,
 }
 
 /// `path:` of a mission.

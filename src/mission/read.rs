@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::fields::{MISSION, PARAMETERISATIONS, PATH, POSE, SAMPLING_LAWS, TIME_LAWS};
 use super::{
     MapSpec, Mission, MissionSpans, NamedJoint, Parameterisation, PathSpec, PoseSpec, Sampling, TimeLaw, Unknown,
-    limits,
+    ViaSpec, limits, solids,
 };
 use crate::diag::shape::Field;
 use crate::diag::yaml::{Entry, Node};
@@ -40,6 +40,7 @@ pub(super) fn parse(name: &str, text: &str) -> Result<Mission, Diagnostics> {
         map: root.get("map").map(map),
         start: root.get("start").map(pose),
         goal: root.get("goal").map(pose),
+        via: root.get("via").map_or(&[][..], Node::items).iter().map(via).collect(),
         path: root.get("path").and_then(given_path),
         clearance: number("clearance_m", 0.05),
         sampling_time: number("sampling_time_s", 0.1),
@@ -65,7 +66,7 @@ fn path(node: Option<&Node>) -> Option<PathBuf> {
     node?.text().map(PathBuf::from)
 }
 
-fn numbers<const N: usize>(node: &Node) -> Option<[f64; N]> {
+pub(super) fn numbers<const N: usize>(node: &Node) -> Option<[f64; N]> {
     let values: Option<Vec<f64>> = node.items().iter().map(Node::number).collect();
     values?.try_into().ok()
 }
@@ -80,6 +81,8 @@ fn map(node: &Node) -> MapSpec {
             _ => Unknown::Occupied,
         },
         origin: node.get("origin_m").and_then(numbers),
+        keep_out: solids::keep_outs(node),
+        boxes: solids::boxes(node),
     }
 }
 
@@ -91,6 +94,10 @@ fn pose(node: &Node) -> PoseSpec {
         yaw: node.get("yaw").and_then(Node::angle),
         joints: joints.iter().filter_map(|e| Some((e.key.clone(), e.value.angle()?))).collect(),
     }
+}
+
+fn via(node: &Node) -> ViaSpec {
+    ViaSpec { place: pose(node), dwell: node.get("dwell_s").and_then(Node::number).unwrap_or(0.0) }
 }
 
 fn given_path(node: &Node) -> Option<PathSpec> {
@@ -118,16 +125,18 @@ fn spans(source: &Arc<Source>, root: &Node) -> MissionSpans {
     let value = |table: &str, key: &str| Some(Span::new(source, root.get(table)?.get(key)?.range.clone()));
     let whole = |key: &str| root.entry(key).map(|e| Span::new(source, with_key(e)));
     let mut joints = Vec::new();
-    for under in ["start", "goal"] {
-        let named = root.get(under).and_then(|p| p.get("joints")).map_or(&[][..], Node::entries);
+    let vias = root.get("via").map_or(&[][..], Node::items);
+    let places = ["start", "goal"].map(|key| (key.to_owned(), root.get(key))).into_iter();
+    for (under, place) in places.chain(vias.iter().enumerate().map(|(i, via)| (format!("via[{i}]"), Some(via)))) {
+        let named = place.and_then(|p| p.get("joints")).map_or(&[][..], Node::entries);
         joints.extend(named.iter().map(|e| NamedJoint {
             name: e.key.clone(),
-            under,
+            under: under.clone(),
             at: Span::new(source, e.key_range.clone()),
         }));
     }
     let limited = limits::joint_names(source, root.get("limits"));
-    joints.extend(limited.into_iter().map(|(name, at)| NamedJoint { name, under: "limits.joints", at }));
+    joints.extend(limited.into_iter().map(|(name, at)| NamedJoint { name, under: "limits.joints".into(), at }));
     MissionSpans {
         robot: root.get("robot").map(|n| Span::new(source, n.range.clone())),
         map: whole("map"),
@@ -136,6 +145,7 @@ fn spans(source: &Arc<Source>, root: &Node) -> MissionSpans {
         map_height: value("map", "height_m"),
         start: whole("start"),
         goal: whole("goal"),
+        via: vias.iter().map(|via| Span::new(source, via.range.clone())).collect(),
         path: whole("path"),
         path_file: value("path", "file"),
         time_law: value_of(source, root, "time_law"),
@@ -165,6 +175,9 @@ impl Between<'_> {
             self.given_path(&mut faults);
         } else {
             self.search(&mut faults);
+        }
+        if let Some(map) = self.root.get("map") {
+            faults.extend(solids::check(self.source, map));
         }
         if let Some(height) = self.root.get("map").and_then(|m| m.get("height_m"))
             && let Some([low, high]) = numbers(height)
@@ -224,6 +237,12 @@ impl Between<'_> {
     }
 
     fn given_path(&self, faults: &mut Vec<Diagnostic>) {
+        if let Some(via) = self.root.entry("via") {
+            let at = Span::new(self.source, via.key_range.clone());
+            let message = "`via` and a given `path` exclude each other: the path is driven as it is";
+            let hint = "remove `via` and lead the path through its places, or remove `path`";
+            faults.push(Diagnostic::error("mission/via-and-path", message).at(&at).hint(hint));
+        }
         let Some(path) = self.root.entry("path") else { return };
         let yaml::Value::Map(_) = path.value.value else { return };
         let key = Span::new(self.source, path.key_range.clone());

@@ -15,6 +15,8 @@ map:
   height_m: [0.02, 1.0]
   unknown: free
   origin_m: [1, 2, 3]
+  keep_out: [{polygon_m: [[0, 0], [1, 0], [1, 2]], height_m: [0.1, 0.5]}]
+  boxes: [{min_m: [0, 1, 2], max_m: [3, 4, 5]}]
 start: {x_m: 0.5, y_m: -0.5, yaw: 180deg, joints: {blade: 90deg, lift: 0.1}}
 goal: {x_m: 9.0, y_m: 8.0, yaw: 1.5, joints: {blade: 0}}
 clearance_m: 0.1
@@ -30,6 +32,9 @@ limits:
   base: {speed_mps: 7, acceleration_mps2: 8, angular_speed_radps: 9, angular_acceleration_radps2: 10, eta: 0.5, min_speed_mps: 0.02}
 path: {bezier: [[[0, 0], [2, 0], [4, 2], [4, 4]], [[4, 4], [4, 5], [4, 6], [4, 7]]]}
 ";
+
+/// Not together with a given path, which [`FULL`] has.
+const VIA: &str = "via: [{x_m: 4.0, y_m: 4.5, yaw: 90deg, joints: {blade: 1}, dwell_s: 2}, {x_m: 5.0, y_m: 6.0}]\n";
 
 const LEAST: &str = "robot: r.urdf\nmap: {file: m.pcd}\nstart: {x_m: 1, y_m: 2, yaw: 0}\ngoal: {x_m: 3, y_m: 4}\n";
 
@@ -66,6 +71,8 @@ fn every_key_is_read() {
         height: Some([0.02, 1.0]),
         unknown: Unknown::Free,
         origin: Some([1.0, 2.0, 3.0]),
+        keep_out: vec![KeepOut { polygon: vec![[0.0, 0.0], [1.0, 0.0], [1.0, 2.0]], height: Some([0.1, 0.5]) }],
+        boxes: vec![Aabb { min: [0.0, 1.0, 2.0], max: [3.0, 4.0, 5.0] }],
     };
     assert_eq!(mission.map, Some(map));
     let start = mission.start.expect("start");
@@ -87,6 +94,17 @@ fn every_key_is_read() {
     assert_eq!([base.angular_acceleration, base.eta, base.min_speed], [Some(10.0), Some(0.5), Some(0.02)]);
     let Some(PathSpec::Bezier(segments)) = mission.path else { panic!("no segments") };
     assert_eq!(segments[1], [[4.0, 4.0], [4.0, 5.0], [4.0, 6.0], [4.0, 7.0]]);
+}
+
+#[test]
+fn stops_on_the_way_are_read_in_their_order() {
+    let mission = good(&format!("{LEAST}{VIA}"));
+    let [first, second] = &mission.via[..] else { panic!("{:?}", mission.via) };
+    assert_eq!((first.place.x, first.place.y, first.place.yaw), (Some(4.0), Some(4.5), Some(FRAC_PI_2)));
+    assert_eq!((first.place.joints["blade"], first.dwell), (1.0, 2.0));
+    assert_eq!((second.place.x, second.place.yaw, second.dwell), (Some(5.0), None, 0.0));
+    assert_eq!((mission.spans.via.len(), mission.spans.joints[0].under.as_str()), (2, "via[0]"));
+    assert_eq!(codes("robot: r\nvia: [{x_m: 1, y_m: 1}]\npath: {file: a.csv}\n"), ["mission/via-and-path"]);
 }
 
 #[test]
@@ -123,7 +141,7 @@ fn a_later_stage_can_point_at_what_it_refuses() {
     assert_eq!(text(&mission.spans.map_file), "../maps/arch.npy");
     assert_eq!(text(&mission.spans.map_resolution), "0.1");
     assert_eq!(text(&mission.spans.robot), "../robots/scr_db/robot.yaml");
-    let joints: Vec<(&str, &str)> = mission.spans.joints.iter().map(|j| (j.name.as_str(), j.under)).collect();
+    let joints: Vec<(&str, &str)> = mission.spans.joints.iter().map(|j| (j.name.as_str(), j.under.as_str())).collect();
     assert_eq!(joints, [("blade", "start"), ("lift", "start"), ("blade", "goal"), ("blade", "limits.joints")]);
     assert!(mission.spans.joints.iter().all(|j| text(&Some(j.at.clone())) == j.name));
 }
@@ -175,6 +193,10 @@ fn tables(path: Vec<&'static str>, table: &'static [Field], out: &mut Vec<(Vec<&
                 path.push("any_name");
                 tables(path, inner, out);
             }
+            Shape::List { item: Shape::Table(inner), .. } => {
+                path.push("an_item");
+                tables(path, inner, out);
+            }
             _ => {}
         }
     }
@@ -192,6 +214,7 @@ fn the_schema_has_exactly_the_keys_that_the_parser_knows() {
     for (path, table) in all_tables() {
         let object = path.iter().fold(&schema, |at, key| match *key {
             "any_name" => &at["additionalProperties"],
+            "an_item" => &at["items"],
             key => &at["properties"][key],
         });
         assert_eq!(object["additionalProperties"], false, "{path:?}");
@@ -206,10 +229,14 @@ fn the_schema_has_exactly_the_keys_that_the_parser_knows() {
 
 #[test]
 fn the_mission_with_every_key_has_every_key() {
-    let source = Arc::new(Source { name: "a".into(), text: FULL.into() });
+    let source = Arc::new(Source { name: "a".into(), text: FULL.to_string() + VIA });
     let root = yaml::load(&source).expect("yaml");
     for (path, table) in all_tables() {
-        let node = path.iter().try_fold(&root, |at, key| at.get(if *key == "any_name" { "blade" } else { key }));
+        let node = path.iter().try_fold(&root, |at, key| match *key {
+            "any_name" => at.get("blade"),
+            "an_item" => at.items().first(),
+            key => at.get(key),
+        });
         let node = node.unwrap_or_else(|| panic!("{path:?}"));
         for field in table.iter().filter(|f| !matches!(f.shape, Shape::Later(_))) {
             // Two ways to give a path; this mission has the other one.
@@ -224,7 +251,7 @@ fn every_example_in_the_documentation_of_a_key_is_good() {
         for field in table.iter().filter(|f| !matches!(f.shape, Shape::Later(_))) {
             let mut text = format!("{{{}: {}}}", field.key, field.example);
             for key in path.iter().rev() {
-                text = format!("{{{key}: {text}}}");
+                text = if *key == "an_item" { format!("[{text}]") } else { format!("{{{key}: {text}}}") };
             }
             let faults = parse("a.yaml", &text).err().map_or(Vec::new(), |f| f.0);
             let wrong: Vec<_> = faults

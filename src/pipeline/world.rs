@@ -40,7 +40,10 @@ fn unknown_joints(mission: &Mission, robot: &RobotModel) -> Vec<Diagnostic> {
         mission.spans.joints.iter().find(|j| j.under == under && j.name == name).map(|j| &j.at)
     };
     let mut faults = Vec::new();
-    for (under, pose) in [("start", &mission.start), ("goal", &mission.goal)] {
+    let ends = [("start", &mission.start), ("goal", &mission.goal)].map(|(key, pose)| (key.to_owned(), pose.as_ref()));
+    let vias = mission.via.iter().enumerate().map(|(i, via)| (format!("via[{i}]"), Some(&via.place)));
+    for (under, pose) in ends.into_iter().chain(vias) {
+        let under = under.as_str();
         for (name, value) in pose.iter().flat_map(|p| &p.joints) {
             let Some(joint) = robot.joints.iter().find(|j| j.name == *name) else {
                 let hint = match nearest(name, names.iter().copied()) {

@@ -4,7 +4,7 @@ use serde_json::{Map, Value, json};
 
 use super::schema::*;
 use super::{Metrics, Report, Status, names};
-use crate::certify::{Certificate, Closest, LimitCheck, Refusal, RefusalKind};
+use crate::certify::{Certificate, Closest, LimitCheck, Reached, Refusal, RefusalKind};
 use crate::command::CommandTable;
 use crate::diag::{Diagnostics, Severity};
 use crate::map::VoxelMap;
@@ -79,6 +79,7 @@ fn refusal_kind(kind: RefusalKind) -> &'static str {
         RefusalKind::Position => "position",
         RefusalKind::Reverse => "reverse",
         RefusalKind::End => "end",
+        RefusalKind::Via => "via",
         RefusalKind::Table => "table",
     }
 }
@@ -227,6 +228,7 @@ impl From<&Certificate> for CertificatePart {
             clearance_proven_m: proven.and_then(finite),
             end_point_error_m: finite(certificate.end_point_error),
             end_heading_error_rad: certificate.end_heading_error.and_then(finite),
+            vias: certificate.vias.iter().filter_map(via).collect(),
             limits_hold: certificate.limits_hold,
             closest: certificate.closest.as_ref().and_then(closest),
             own_links: certificate
@@ -234,6 +236,14 @@ impl From<&Certificate> for CertificatePart {
                 .map(|own| OwnLinksPart { pairs_checked: own.pairs, keep_apart: own.apart }),
         }
     }
+}
+
+fn via(reached: &Reached) -> Option<ViaPart> {
+    Some(ViaPart {
+        time_s: finite(reached.time)?,
+        point_error_m: finite(reached.point_error)?,
+        heading_error_rad: reached.heading_error.and_then(finite),
+    })
 }
 
 fn closest(closest: &Closest) -> Option<ClosestPart> {
@@ -276,6 +286,7 @@ mod tests {
             own_links: None,
             end_point_error: 4e-5,
             end_heading_error: None,
+            vias: Vec::new(),
             limits: vec![LimitCheck { actuator: "wheel_left".into(), quantity: "jerk", peak: 0.1, limit: None }],
             limits_hold: true,
             refusals: Vec::new(),

@@ -269,6 +269,9 @@ pub struct CertificatePart {
     /// rad; absent where the goal leaves the heading open.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub end_heading_error_rad: Option<f64>,
+    /// The mission's `via`, in order: each with the time at which the robot first stands there.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub vias: Vec<ViaPart>,
     /// Whether no limit is exceeded.
     pub limits_hold: bool,
     /// The closest approach found.
@@ -277,6 +280,18 @@ pub struct CertificatePart {
     /// The robot's links against each other; absent where none that are checked move against each other.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub own_links: Option<OwnLinksPart>,
+}
+
+/// A via that was reached.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ViaPart {
+    /// s.
+    pub time_s: f64,
+    /// m.
+    pub point_error_m: f64,
+    /// rad; absent where the via leaves the heading open.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub heading_error_rad: Option<f64>,
 }
 
 /// What was proven of the robot's links against each other.

@@ -188,6 +188,10 @@ fn own_links(out: &mut String, certificate: &CertificatePart, robot: Option<&Rob
 }
 
 fn goal(out: &mut String, certificate: &CertificatePart) {
+    let stops: Vec<String> = certificate.vias.iter().map(|via| format!("{:.1} s", via.time_s)).collect();
+    if !stops.is_empty() {
+        line(out, "stops", &format!("at {}", stops.join(", ")));
+    }
     if let Some(text) = goal_text(certificate) {
         line(out, "goal", &text);
     }

@@ -123,6 +123,14 @@ fn poses_that_cannot_be() {
     spoiled("goal_in_collision", 1, set("x_m: 3.4", "x_m: 1.95"));
     spoiled("goal_off_the_map", 1, set("x_m: 3.4", "x_m: 34"));
     spoiled("goal_at_the_edge", 1, set("x_m: 3.4", "x_m: 3.9"));
+    let blocked = "via: [{x_m: 2.0, y_m: 0.6}, {x_m: 1.95, y_m: 1.5}]\ngoal:";
+    spoiled("via_in_collision", 1, set("goal:", blocked));
+    spoiled("via_for_days", 1, |s| {
+        let day = "{x_m: 2.0, y_m: 0.6, dwell_s: 86400}";
+        s.edit("missions/a.yaml", "goal:", &format!("via: [{day}, {day}, {day}]\ngoal:"));
+    });
+    let no_joint = "via: [{x_m: 2.0, y_m: 0.6}, {x_m: 2.0, y_m: 2.4, joints: {blade: 0}}]\ngoal:";
+    spoiled("via_joint", 2, set("goal:", no_joint));
     spoiled("start_off_the_map", 1, set("x_m: 0.6", "x_m: -6"));
 }
 

@@ -138,7 +138,7 @@ impl Site<'_> {
         }
         let names = std::iter::once(&file.name).chain(file.beside.as_ref().map(|(name, _)| name));
         let files = names.filter_map(|name| read.iter().find(|(path, _)| path == Path::new(name)).cloned()).collect();
-        let height = spec.height.is_none().then(|| world.robot.top_over_all_postures());
+        let height = spec.ends_at_the_robot().then(|| world.robot.top_over_all_postures());
         self.schedule.offer(key, Shared { place: place.clone(), files, absent, height });
     }
 }

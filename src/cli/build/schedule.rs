@@ -11,7 +11,7 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use blake3::Hash;
 
 use crate::cli::inputs::{folder_of, tidy};
-use crate::mission::Mission;
+use crate::mission::{MapSpec, Mission};
 use crate::pipeline::Place;
 
 /// What decides which cells of a map are occupied.
@@ -42,11 +42,12 @@ pub struct Shared {
 /// The key of a mission's map, which lies at `path`. Where the mission gives no slab it is the robot's height that ends it.
 pub fn map_key(mission: &Mission, path: &Path) -> Option<MapKey> {
     let spec = mission.map.as_ref()?;
-    let robot = spec.height.is_none().then(|| {
+    let robot = spec.ends_at_the_robot().then(|| {
         let folder = folder_of(Path::new(&mission.source.name));
         (tidy(&folder.join(&mission.robot)), &mission.limits)
     });
-    Some(format!("{path:?} {:?} {:?} {:?} {:?} {robot:?}", spec.resolution, spec.height, spec.unknown, spec.origin))
+    let MapSpec { file: _, resolution, height, unknown, origin, keep_out, boxes } = spec;
+    Some(format!("{path:?} {resolution:?} {height:?} {unknown:?} {origin:?} {keep_out:?} {boxes:?} {robot:?}"))
 }
 
 enum Progress {
@@ -224,6 +225,26 @@ mod tests {
                 assert_eq!(other.join().expect("no panic").index, 1);
             });
             assert_eq!(s.ready(&"a".into()).is_some(), offered);
+        }
+    }
+
+    #[test]
+    fn a_map_is_shared_only_with_missions_that_add_the_same_to_it() {
+        let key = |added: &str| {
+            let rest = "start: {x_m: 0, y_m: 0, yaw: 0}\ngoal: {x_m: 1, y_m: 1}\n";
+            let text = format!("robot: r.urdf\nmap: {{file: m.pcd, height_m: [0, 1]{added}}}\n{rest}");
+            map_key(&crate::mission::parse("a.yaml", &text).expect("good"), Path::new("m.pcd"))
+        };
+        let area = ", keep_out: [{polygon_m: [[2, 1], [3, 1], [3, 2]], height_m: [0, 1]}]";
+        let keys = [
+            key(""),
+            key(area),
+            key(", keep_out: [{polygon_m: [[2, 1], [3, 1], [3, 2]]}]"),
+            key(", boxes: [{min_m: [2, 1, 0], max_m: [3, 2, 0.5]}]"),
+        ];
+        assert_eq!(key(area), keys[1]);
+        for (i, one) in keys.iter().enumerate() {
+            assert!(keys[..i].iter().all(|other| other != one), "{one:?}");
         }
     }
 

@@ -19,6 +19,8 @@ fn spec(height: [f64; 2]) -> MapSpec {
         height: Some(height),
         unknown: Unknown::Occupied,
         origin: None,
+        keep_out: Vec::new(),
+        boxes: Vec::new(),
     }
 }
 

@@ -126,6 +126,10 @@ fn proven(inputs: &PageInputs<'_>, certificate: &CertificatePart) -> Vec<(String
         (false, _) => "a limit is passed".to_owned(),
     };
     out.push(("Limits".into(), escape(&limits)));
+    if !certificate.vias.is_empty() {
+        let times: Vec<String> = certificate.vias.iter().map(|via| format!("{:.1} s", via.time_s)).collect();
+        out.push(("Stops".into(), escape(&format!("at rest at each via: at {}", times.join(", ")))));
+    }
     if let Some(error) = certificate.end_point_error_m {
         let heading = certificate.end_heading_error_rad.map_or(String::new(), |a| format!(" and {}", degrees(a)));
         let allowed = format!("{} and {}", mm(END_POINT_TOLERANCE), degrees(END_ANGLE_TOLERANCE));

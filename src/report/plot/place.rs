@@ -11,16 +11,18 @@ const POSTURES: usize = 17;
 /// Draws start and goal where they are given: a heading left open as 0, joints left open in the middle of their range.
 pub fn ends(view: &mut TopView, robot: &RobotModel, [start, goal]: [Option<&PoseSpec>; 2]) {
     for (pose, name) in [(start, "start"), (goal, "goal")] {
-        if let Some((x, y, pose)) = pose.and_then(|p| Some((p.x?, p.y?, p))) {
-            let q: Vec<f64> = robot
-                .joints
-                .iter()
-                .zip(posture(robot, 0.5))
-                .map(|(joint, middle)| pose.joints.get(&joint.name).copied().unwrap_or(middle))
-                .collect();
-            view.end(robot, Pose2::new(x, y, pose.yaw.unwrap_or(0.0)), &q, name);
+        if let Some(pose) = pose {
+            stand(view, robot, pose, name);
         }
     }
+}
+
+/// Draws the robot in a place that a mission names, if its position is known; joints left open in the middle of their ranges.
+pub fn stand(view: &mut TopView, robot: &RobotModel, pose: &PoseSpec, name: &str) {
+    let Some((x, y)) = pose.x.zip(pose.y) else { return };
+    let joints = robot.joints.iter().zip(posture(robot, 0.5));
+    let q: Vec<f64> = joints.map(|(joint, middle)| pose.joints.get(&joint.name).copied().unwrap_or(middle)).collect();
+    view.end(robot, Pose2::new(x, y, pose.yaw.unwrap_or(0.0)), &q, name);
 }
 
 /// Every joint at the same share (0 to 1) of its range; joints without ends at 0.

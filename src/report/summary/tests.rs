@@ -22,6 +22,7 @@ fn certificate() -> Certificate {
         own_links: None,
         end_point_error: 4.2e-5,
         end_heading_error: Some(1.7e-5),
+        vias: Vec::new(),
         limits: vec![
             check("wheel_left", "speed", 0.4987, Some(0.5)),
             check("wheel_left", "acceleration", 0.312, Some(0.5)),

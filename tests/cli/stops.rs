@@ -1,0 +1,104 @@
+//! Missions that stop on the way, and obstacles that only a mission has.
+
+use serde_json::Value;
+
+use super::sandbox::Sandbox;
+
+/// The sandbox's mission with this before its goal.
+fn sandbox_with(line: &str) -> Sandbox {
+    let sandbox = Sandbox::new();
+    sandbox.edit("missions/a.yaml", "goal:", &format!("{line}\ngoal:"));
+    sandbox
+}
+
+/// Columns of the commands, row by row.
+fn rows(sandbox: &Sandbox, columns: &[&str]) -> Vec<Vec<f64>> {
+    let text = sandbox.text("out/a/commands.csv");
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
+    let at: Vec<usize> = columns.iter().map(|c| header.iter().position(|h| h == c).expect("a column")).collect();
+    let row = |line: &str| {
+        let words: Vec<&str> = line.split(',').collect();
+        at.iter().map(|i| words[*i].parse().expect("a number")).collect()
+    };
+    lines.map(row).collect()
+}
+
+#[test]
+fn a_round_is_one_command_file_that_stands_at_every_via() {
+    let sandbox = sandbox_with(
+        "via:\n  - {x_m: 2.0, y_m: 0.6, dwell_s: 1.25}\n  - {x_m: 3.3, y_m: 2.3, yaw: 90deg}\n  - {x_m: 3.3, y_m: 2.3}\n  \
+         - {x_m: 0.6, y_m: 1.5, yaw: 0deg}",
+    );
+    let run = sandbox.run(&["compile", "missions/a.yaml"]).expect(0);
+    assert!(run.stdout.contains("\n  stops       at "), "{}", run.stdout);
+    let report: Value = serde_json::from_slice(&sandbox.read("out/a/report.json")).expect("JSON");
+    let vias = report["certificate"]["vias"].as_array().expect("a list");
+    let rows = rows(&sandbox, &["time_s", "wheel_left_rad_s", "wheel_right_rad_s", "x_m", "y_m", "yaw_rad"]);
+    let places = [(2.0, 0.6, None), (3.3, 2.3, Some(90f64)), (3.3, 2.3, None), (0.6, 1.5, Some(0.0))];
+    assert_eq!(vias.len(), places.len());
+    let mut before = 0.0;
+    for (via, (x, y, yaw)) in vias.iter().zip(places) {
+        let time = via["time_s"].as_f64().expect("a number");
+        assert!(time > before);
+        before = time;
+        let row = rows.iter().find(|row| (row[0] - time).abs() < 1e-9).expect("a row");
+        assert_eq!([row[1], row[2]], [0.0, 0.0]);
+        assert!((row[3] - x).hypot(row[4] - y) < 1e-3, "{row:?}");
+        let turned = |yaw: f64| (row[5] - yaw.to_radians()).sin().abs();
+        assert!(yaw.is_none_or(|yaw| turned(yaw) < 2e-3), "{row:?}");
+    }
+    let dwelt = rows.iter().filter(|row| row[1] == 0.0 && row[2] == 0.0 && (row[3] - 2.0).hypot(row[4] - 0.6) < 1e-3);
+    assert_eq!(dwelt.count(), 13, "1.25 s are 13 rows of 0.1 s");
+    for file in ["commands.csv", "commands.mcap"] {
+        let run = sandbox.run(&["check", &format!("out/a/{file}")]).expect(0);
+        assert!(run.stdout.contains("all checks hold"), "{}", run.stdout);
+    }
+    for (from, to) in [("x_m: 2.0, y_m: 0.6", "x_m: 2.0, y_m: 0.602"), ("dwell_s: 1.25", "dwell_s: 1.35")] {
+        sandbox.edit("missions/a.yaml", from, to);
+        let run = sandbox.run(&["check", "out/a/commands.csv", "--mission", "missions/a.yaml"]).expect(1);
+        assert!((run.stdout + &run.stderr).contains("does not stop at via[0]"));
+        sandbox.edit("missions/a.yaml", to, from);
+    }
+}
+
+#[test]
+fn a_stretch_without_a_way_is_named() {
+    let sandbox = sandbox_with("via: [{x_m: 2.0, y_m: 0.6}, {x_m: 1.95, y_m: 1.5}]");
+    let run = sandbox.run(&["compile", "missions/a.yaml"]).expect(1);
+    assert!(
+        run.stderr.contains("on the stretch from `via[0]` to `via[1]`: the goal is in collision"),
+        "{}",
+        run.stderr
+    );
+    assert!(run.stderr.contains(" --> missions/a.yaml:8:29\n"), "{}", run.stderr);
+    assert!(!sandbox.exists("out/a/commands.csv"));
+}
+
+#[test]
+fn areas_and_boxes_of_the_mission_are_driven_around_and_are_in_the_proof() {
+    let south = "keep_out: [{polygon_m: [[1.6, 0.0], [2.4, 0.0], [2.0, 1.4]]}]";
+    let north = "boxes: [{min_m: [1.8, 1.6, 0.0], max_m: [2.2, 3.0, 0.2]}]";
+    let with = |added: &str| {
+        let sandbox = Sandbox::new();
+        sandbox.edit("missions/a.yaml", "resolution_m: 0.05", &format!("resolution_m: 0.05\n  {added}"));
+        sandbox
+    };
+    for (added, side) in [(south, 1.0), (north, -1.0)] {
+        let sandbox = with(added);
+        sandbox.run(&["compile", "missions/a.yaml"]).expect(0);
+        let middle = rows(&sandbox, &["x_m", "y_m"]).into_iter().filter(|row| (row[0] - 2.0).abs() < 0.3);
+        assert!(middle.map(|row| side * (row[1] - 1.5)).fold(f64::INFINITY, f64::min) > 0.2, "{added}");
+        // The way of the one leads through the obstacle of the other.
+        let other = if added == south { north } else { south };
+        sandbox.edit("missions/a.yaml", added, other);
+        let run = sandbox.run(&["check", "out/a/commands.csv", "--mission", "missions/a.yaml"]).expect(1);
+        assert!((run.stdout + &run.stderr).contains("clearance"));
+    }
+    let both = with(&format!("{south}\n  {north}"));
+    assert!(both.run(&["compile", "missions/a.yaml"]).expect(1).stderr.contains("no way to the goal"));
+    both.edit("missions/a.yaml", "goal:", "via: [{x_m: 0.8, y_m: 2.4}]\ngoal:");
+    let after_a_stop = both.run(&["compile", "missions/a.yaml"]).expect(1).stderr;
+    assert!(after_a_stop.contains("on the stretch from `via[0]` to the goal: no way"), "{after_a_stop}");
+    assert!(after_a_stop.contains("or say which heading and joints `via[0]` shall have"), "{after_a_stop}");
+}
