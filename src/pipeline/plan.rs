@@ -49,7 +49,27 @@ pub(super) fn plan(
     let query = query(finish.mission, finish.robot);
     let path = route(run, finish, map, compile, &query).map_err(|error| place_search_error(finish.mission, &error))?;
     note(run, &path, finish.robot);
-    optimise(run, finish, map, compile, &path, &|trajectory| finish.task(trajectory))
+    let task = |trajectory: &Trajectory| finish.task(trajectory);
+    let made = optimise(run, finish, map, compile, &path, &task);
+    if made.as_ref().is_ok_and(|made| made.certificate.holds()) {
+        return made;
+    }
+    // Between the postures that were sampled something may have been in the way: another path leads by others.
+    let field = map.field(compile.threads);
+    let options = search_options(finish.mission, SEARCH_MARGIN);
+    let other = run.stage("search", || search::with_more_postures(map, field, finish.robot, &query, &options));
+    let Some(other) = other else { return made };
+    match optimise(run, finish, map, compile, &other, &task) {
+        Ok(better) if better.certificate.holds() => {
+            note(run, &other, finish.robot);
+            Ok(better)
+        }
+        _ => made,
+    }
+}
+
+fn search_options(mission: &Mission, margin: f64) -> SearchOptions {
+    SearchOptions { clearance: mission.clearance + margin, reverse: mission.reverse }
 }
 
 /// The search's path.
@@ -63,7 +83,7 @@ pub(super) fn route(
     let (mission, robot) = (finish.mission, finish.robot);
     let field = run.stage("esdf", || map.field(compile.threads));
     run.stage("search", || {
-        let options = |margin: f64| SearchOptions { clearance: mission.clearance + margin, reverse: mission.reverse };
+        let options = |margin: f64| search_options(mission, margin);
         // What fits only without the margin is found too, and what is absent is absent without it.
         search::search(map, field, robot, query, &options(SEARCH_MARGIN)).or_else(|error| match error {
             SearchError::OffMap { .. } | SearchError::Limit { .. } | SearchError::Sampled { .. } => Err(error),

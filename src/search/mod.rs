@@ -132,6 +132,21 @@ pub fn search(
     }
 }
 
+/// Another path than [`search`] finds, by more postures of many joints than it looks at first; `None`: there are no more, or none was found
+/// soon.
+pub fn with_more_postures(
+    map: &VoxelMap,
+    esdf: &Esdf,
+    robot: &RobotModel,
+    query: &Query,
+    options: &SearchOptions,
+) -> Option<SearchPath> {
+    let levels = Postures::levels(robot);
+    let problem = Problem { map, esdf, robot, query, options };
+    let postures = (levels > 1).then(|| Postures::new(robot, query, levels - 1))?;
+    Solver::<{ posture::MOST_POSTURES / 64 }>::new(problem, postures).ok()?.guided()
+}
+
 /// A path with few postures, where one is found soon.
 fn quick(problem: Problem<'_>, postures: Postures) -> Option<SearchPath> {
     Solver::<{ posture::FEW_POSTURES / 64 }>::new(problem, postures).ok()?.guided()
