@@ -306,9 +306,9 @@ mod tests {
         let pairs = robot.self_pairs();
         assert!(!pairs.is_empty());
         let ends = [asked([0.3, 0.4, -0.2, 0.5, 0.1]), asked([-1.0, 0.2, 0.7, -0.6, 0.3])];
-        for level in 0..SIZES.len() {
+        for (level, size) in SIZES.iter().enumerate() {
             let (values, roadmap) = build(&robot, &NEAR, [&ends[0], &ends[1]], level);
-            assert!(values.len() <= SIZES[level].most, "{}", values.len());
+            assert!(values.len() <= size.most, "{}", values.len());
             for (p, own) in roadmap.neighbours.iter().enumerate() {
                 for q in own {
                     assert!(roadmap.neighbours[*q as usize].contains(&(p as u32)));
