@@ -66,7 +66,7 @@ impl<F: FnMut(&[f64]) -> bool> Escape<F> {
         to.iter().for_each(|posture| {
             trees[1].add(posture.clone(), None);
         });
-        for turn in 0.. {
+        for turn in 0..2 * MOST_LOOKS {
             if self.looks > MOST_LOOKS || to.is_empty() {
                 break;
             }
@@ -117,7 +117,7 @@ impl<F: FnMut(&[f64]) -> bool> Escape<F> {
             }
             let share = (STEP_TIME / left).min(1.0);
             let next = between(&tree.postures[at], target, share);
-            if !self.is_free(&next) {
+            if self.looks > MOST_LOOKS || !self.is_free(&next) {
                 return (made, false);
             }
             at = tree.add(next, Some(at));

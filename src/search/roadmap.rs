@@ -13,6 +13,9 @@ use crate::robot::RobotModel;
 /// Time that a step may take at the joints' planning speeds, s, if there is room for as many postures.
 const STEP_TIME: f64 = 0.12;
 
+/// Most steps of a way that are looked at.
+const MOST_STEPS: usize = 200;
+
 /// How large a roadmap is.
 struct Size {
     /// Postures that are looked at for those in which the robot is folded up.
@@ -107,7 +110,8 @@ impl Builder<'_> {
 
     /// Whether no links touch on the straight way between two postures, looked at as closely as it will be sampled.
     fn is_open(&self, a: &[f64], b: &[f64]) -> bool {
-        let steps = (self.time(a, b) / STEP_TIME).ceil() as usize;
+        // No closer than that for joints that are very slow.
+        let steps = ((self.time(a, b) / STEP_TIME).ceil() as usize).min(MOST_STEPS);
         (1..steps).all(|k| !self.touches(&between(a, b, k as f64 / steps as f64)))
     }
 
