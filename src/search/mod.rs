@@ -1,6 +1,7 @@
 //! Stage 6: a drivable path on a lattice over (x, y, yaw, posture).
 //!
-//! Resolution-complete: [`search`] returns a path, or the proof that none exists on the lattice (`lattice`: positions 5 cm
+//! Resolution-complete with one joint or two (with more it moves on a roadmap of sampled postures, `roadmap`, and what it does not find may
+//! exist): [`search`] returns a path, or the proof that none exists on the lattice (`lattice`: positions 5 cm
 //! apart, 72 headings; `posture`: 64 values of a joint), every move checked exactly against the occupied cells' cubes as a
 //! sweep. (\[SCR\] takes a hybrid A* for its initial path; see `astar` for what replaces its fourth dimension.)
 
