@@ -96,6 +96,17 @@ pub struct MotionLimits {
     pub jerk: Option<f64>,
 }
 
+impl MovingJoint {
+    /// Least and greatest position; of an endless joint those of one turn about `near`.
+    pub fn range_about(&self, near: f64) -> [f64; 2] {
+        let turn = std::f64::consts::PI;
+        [
+            if self.lower.is_finite() { self.lower } else { near - turn },
+            if self.upper.is_finite() { self.upper } else { near + turn },
+        ]
+    }
+}
+
 impl MotionLimits {
     /// Limits to plan with: a missing acceleration is speed/1 s, a missing jerk acceleration/0.25 s; a missing speed 1.
     pub fn planning(&self) -> [f64; 3] {

@@ -243,9 +243,7 @@ pub(super) fn meetings(robot: &RobotModel) -> Vec<Meeting> {
 /// Posture `index` of a Halton sequence over the joints' ranges; endless joints turn once.
 fn spread(robot: &RobotModel, index: usize) -> Vec<f64> {
     let value = |(axis, joint): (usize, &super::MovingJoint)| {
-        let turn = std::f64::consts::PI;
-        let low = if joint.lower.is_finite() { joint.lower } else { -turn };
-        let high = if joint.upper.is_finite() { joint.upper } else { turn };
+        let [low, high] = joint.range_about(0.0);
         low + halton::value(axis, index) * (high - low)
     };
     robot.joints.iter().enumerate().map(value).collect()

@@ -1,7 +1,7 @@
 //! A way out of a posture from which no straight way leads: two trees of postures that grow towards each other, the base standing
 //! (RRT-Connect, Kuffner & LaValle 2000; samples from a Halton sequence, so that it finds the same way each time).
 
-use crate::math::halton;
+use super::joint_space::{JointSpace, between};
 use crate::robot::RobotModel;
 
 /// Time that a step may take at the joints' planning speeds, s.
@@ -9,10 +9,9 @@ const STEP_TIME: f64 = 0.06;
 /// Postures that are looked at before it gives up.
 const MOST_LOOKS: usize = 6_000;
 
-/// Postures by the joints' ranges and speeds, and which of them are free.
+/// Postures, and which of them are free.
 pub(super) struct Escape<F: FnMut(&[f64]) -> bool> {
-    speeds: Vec<f64>,
-    ranges: Vec<[f64; 2]>,
+    space: JointSpace,
     free: F,
     looks: usize,
 }
@@ -45,18 +44,7 @@ impl Tree {
 impl<F: FnMut(&[f64]) -> bool> Escape<F> {
     /// `near`: values about which endless joints are sampled.
     pub fn new(robot: &RobotModel, near: &[f64], free: F) -> Self {
-        let turn = std::f64::consts::PI;
-        let range = |(joint, near): (&crate::robot::MovingJoint, &f64)| {
-            let low = if joint.lower.is_finite() { joint.lower } else { near - turn };
-            let high = if joint.upper.is_finite() { joint.upper } else { near + turn };
-            [low, high]
-        };
-        Self {
-            speeds: robot.joints.iter().map(|joint| joint.limits.planning()[0]).collect(),
-            ranges: robot.joints.iter().zip(near).map(range).collect(),
-            free,
-            looks: 0,
-        }
+        Self { space: JointSpace::new(robot, near), free, looks: 0 }
     }
 
     /// Postures from `from` to one of `to`, both among them, no farther apart than a step; `None`: none found. All given ones are free.
@@ -72,12 +60,7 @@ impl<F: FnMut(&[f64]) -> bool> Escape<F> {
             }
             // Each sample for both trees: of every other point of the sequence one joint is always high.
             let (growing, index) = (turn % 2, turn / 2 + 1);
-            let sample: Vec<f64> = self
-                .ranges
-                .iter()
-                .enumerate()
-                .map(|(joint, [low, high])| low + halton::value(joint, index) * (high - low))
-                .collect();
+            let sample = self.space.sample(index);
             let (end, _) = self.grow(&mut trees[growing], &sample, 1);
             if let Some(end) = end {
                 let target = trees[growing].postures[end].clone();
@@ -94,10 +77,6 @@ impl<F: FnMut(&[f64]) -> bool> Escape<F> {
         None
     }
 
-    fn time(&self, a: &[f64], b: &[f64]) -> f64 {
-        a.iter().zip(b).zip(&self.speeds).map(|((a, b), speed)| (a - b).abs() / speed).fold(0.0, f64::max)
-    }
-
     fn is_free(&mut self, posture: &[f64]) -> bool {
         self.looks += 1;
         (self.free)(posture)
@@ -105,13 +84,13 @@ impl<F: FnMut(&[f64]) -> bool> Escape<F> {
 
     /// Up to `most` steps from the nearest posture of a tree towards another; the last one made, and whether it is there.
     fn grow(&mut self, tree: &mut Tree, target: &[f64], most: usize) -> (Option<usize>, bool) {
-        let distance = |k: &usize| self.time(&tree.postures[*k], target);
+        let distance = |k: &usize| self.space.time(&tree.postures[*k], target);
         let Some(mut at) = (0..tree.postures.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))) else {
             return (None, false);
         };
         let mut made = None;
         for _ in 0..most {
-            let left = self.time(&tree.postures[at], target);
+            let left = self.space.time(&tree.postures[at], target);
             if left < 1e-9 {
                 return (made.or(Some(at)), true);
             }
@@ -123,7 +102,7 @@ impl<F: FnMut(&[f64]) -> bool> Escape<F> {
             at = tree.add(next, Some(at));
             made = Some(at);
         }
-        (made, made.is_some_and(|at| self.time(&tree.postures[at], target) < 1e-9))
+        (made, made.is_some_and(|at| self.space.time(&tree.postures[at], target) < 1e-9))
     }
 
     /// The way with straight pieces where those are free, sampled anew.
@@ -148,14 +127,9 @@ impl<F: FnMut(&[f64]) -> bool> Escape<F> {
 
     /// Postures between two, without them.
     fn sampled(&self, a: &[f64], b: &[f64]) -> Vec<Vec<f64>> {
-        let steps = (self.time(a, b) / STEP_TIME).ceil() as usize;
+        let steps = (self.space.time(a, b) / STEP_TIME).ceil() as usize;
         (1..steps).map(|k| between(a, b, k as f64 / steps as f64)).collect()
     }
-}
-
-/// The posture so far on the straight way from one to another.
-fn between(a: &[f64], b: &[f64], share: f64) -> Vec<f64> {
-    a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect()
 }
 
 #[cfg(test)]
@@ -184,7 +158,7 @@ mod tests {
         assert!(to.contains(&way[way.len() - 1]));
         for pair in way.windows(2) {
             assert!(pair.iter().all(|q| wall(q, 0.8..0.95)), "{pair:?}");
-            assert!(escape.time(&pair[0], &pair[1]) <= STEP_TIME + 1e-9, "{pair:?}");
+            assert!(escape.space.time(&pair[0], &pair[1]) <= STEP_TIME + 1e-9, "{pair:?}");
         }
     }
 

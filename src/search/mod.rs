@@ -15,6 +15,7 @@ mod explain;
 mod guide;
 mod headed;
 mod heuristic;
+mod joint_space;
 mod joints;
 mod lattice;
 mod obstacles;
@@ -121,7 +122,7 @@ pub fn search(
     }
     let problem = Problem { map, esdf, robot, query, options };
     for level in 1..Postures::levels(robot) {
-        if let Some(path) = quick(problem, Postures::new(robot, query, level - 1)) {
+        if let Some(path) = quick::<{ posture::FEW_POSTURES / 64 }>(problem, Postures::new(robot, query, level - 1)) {
             return Ok(path);
         }
     }
@@ -145,12 +146,12 @@ pub fn with_more_postures(
     let levels = Postures::levels(robot);
     let problem = Problem { map, esdf, robot, query, options };
     let postures = (levels > 1).then(|| Postures::new(robot, query, levels - 1))?;
-    Solver::<{ posture::MOST_POSTURES / 64 }>::new(problem, postures).ok()?.guided()
+    quick::<{ posture::MOST_POSTURES / 64 }>(problem, postures)
 }
 
-/// A path with few postures, where one is found soon.
-fn quick(problem: Problem<'_>, postures: Postures) -> Option<SearchPath> {
-    Solver::<{ posture::FEW_POSTURES / 64 }>::new(problem, postures).ok()?.guided()
+/// A path with these postures, where one is found soon.
+fn quick<const W: usize>(problem: Problem<'_>, postures: Postures) -> Option<SearchPath> {
+    Solver::<W>::new(problem, postures).ok()?.guided()
 }
 
 /// Labels that the lattice search may make with a roadmap of postures: it proves nothing, and each takes long.

@@ -74,8 +74,7 @@ impl Postures {
             n => (2..=64usize).rev().find(|k| k.pow(n as u32) <= MOST_POSTURES).unwrap_or(1),
         };
         let samples = robot.joints.iter().zip(near).map(|(joint, near)| {
-            let lower = if joint.lower.is_finite() { joint.lower } else { near - std::f64::consts::PI };
-            let upper = if joint.upper.is_finite() { joint.upper } else { near + std::f64::consts::PI };
+            let [lower, upper] = joint.range_about(*near);
             let samples = if upper > lower { per_joint } else { 1 };
             let step = (upper - lower) / (samples.max(2) - 1) as f64;
             (0..samples).map(|k| if k + 1 == samples { upper } else { lower + step * k as f64 }).collect()
@@ -128,15 +127,14 @@ impl Postures {
         out.is_empty().then(|| (from, wanted.and(free).iter().collect()))
     }
 
-    /// With a way of postures, the first and last of which are in it already; as many of the others as there is room for.
-    pub fn with_way(&self, way: &[Vec<f64>], most: usize) -> Self {
+    /// With a way of postures, the first and last of which are in it already; of the others so many at most.
+    pub fn with_way(&self, way: &[Vec<f64>], room: usize) -> Self {
         let mut more = self.clone();
         let known = |posture: &Vec<f64>| self.values.iter().position(|own| own == posture);
         let Steps::Roadmap(roadmap) = &mut more.steps else { return more };
         let (Some(from), Some(to)) = (known(&way[0]), known(&way[way.len() - 1])) else { return more };
-        let room = most.saturating_sub(self.values.len()).max(1);
         let inner = &way[1..way.len() - 1];
-        let every = (inner.len() as f64 / room as f64).ceil().max(2.0) as usize;
+        let every = (inner.len() as f64 / room.max(1) as f64).ceil().max(2.0) as usize;
         let mut last = from as u32;
         for posture in inner.iter().skip(every - 1).step_by(every) {
             let next = more.values.len() as u32;

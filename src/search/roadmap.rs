@@ -6,8 +6,8 @@
 
 use std::collections::BTreeSet;
 
+use super::joint_space::{JointSpace, between};
 use super::posture::{FEW_POSTURES, MOST_POSTURES, Roadmap};
-use crate::math::halton;
 use crate::robot::RobotModel;
 
 /// Time that a step may take at the joints' planning speeds, s, if there is room for as many postures.
@@ -46,9 +46,7 @@ const DESCENT: [f64; 4] = [0.12, 0.06, 0.03, 0.015];
 struct Builder<'a> {
     robot: &'a RobotModel,
     pairs: Vec<[usize; 2]>,
-    ranges: Vec<[f64; 2]>,
-    /// Planning speeds.
-    speeds: Vec<f64>,
+    space: JointSpace,
     /// Shapes that joints move.
     moved: Vec<usize>,
     size: &'static Size,
@@ -62,22 +60,9 @@ pub(super) fn build(
     asked: [&[Option<f64>]; 2],
     level: usize,
 ) -> (Vec<Vec<f64>>, Roadmap) {
-    let range = |(joint, near): (&crate::robot::MovingJoint, &f64)| {
-        let turn = std::f64::consts::PI;
-        [
-            if joint.lower.is_finite() { joint.lower } else { near - turn },
-            if joint.upper.is_finite() { joint.upper } else { near + turn },
-        ]
-    };
     let moved = (0..robot.shapes.len()).filter(|s| robot.is_moved(robot.shapes[*s].body)).collect();
-    let builder = Builder {
-        robot,
-        pairs: robot.self_pairs(),
-        ranges: robot.joints.iter().zip(near).map(range).collect(),
-        speeds: robot.joints.iter().map(|joint| joint.limits.planning()[0]).collect(),
-        moved,
-        size: &SIZES[level],
-    };
+    let builder =
+        Builder { robot, pairs: robot.self_pairs(), space: JointSpace::new(robot, near), moved, size: &SIZES[level] };
     builder.roadmap(asked)
 }
 
@@ -99,11 +84,6 @@ impl Builder<'_> {
         self.sampled(keys, own, ends, &ways)
     }
 
-    /// Time between two postures, each joint at its planning speed, s.
-    fn time(&self, a: &[f64], b: &[f64]) -> f64 {
-        a.iter().zip(b).zip(&self.speeds).map(|((a, b), speed)| (a - b).abs() / speed).fold(0.0, f64::max)
-    }
-
     fn touches(&self, q: &[f64]) -> bool {
         !self.pairs.is_empty() && self.robot.touching(&self.pairs, q).is_some()
     }
@@ -111,7 +91,7 @@ impl Builder<'_> {
     /// Whether no links touch on the straight way between two postures, looked at as closely as it will be sampled.
     fn is_open(&self, a: &[f64], b: &[f64]) -> bool {
         // No closer than that for joints that are very slow.
-        let steps = ((self.time(a, b) / STEP_TIME).ceil() as usize).min(MOST_STEPS);
+        let steps = ((self.space.time(a, b) / STEP_TIME).ceil() as usize).min(MOST_STEPS);
         (1..steps).all(|k| !self.touches(&between(a, b, k as f64 / steps as f64)))
     }
 
@@ -134,17 +114,12 @@ impl Builder<'_> {
         wide + height * top
     }
 
-    fn sample(&self, index: usize) -> Vec<f64> {
-        let value = |(joint, [low, high]): (usize, &[f64; 2])| low + halton::value(joint, index) * (high - low);
-        self.ranges.iter().enumerate().map(value).collect()
-    }
-
     /// Postures in which the robot is folded up, and how many, the narrowest first; behind them such as lie far apart.
     fn folded_and_spread(&self) -> (usize, Vec<Vec<f64>>) {
         let Size { surveyed: count, folded, spread, .. } = *self.size;
-        let surveyed: Vec<Vec<f64>> = (1..=count).map(|index| self.sample(index)).collect();
-        let mut rest: Vec<f64> = vec![0.0; self.ranges.len()];
-        rest.iter_mut().zip(&self.ranges).for_each(|(v, [low, high])| *v = v.clamp(*low, *high));
+        let surveyed: Vec<Vec<f64>> = (1..=count).map(|index| self.space.sample(index)).collect();
+        let mut rest: Vec<f64> = vec![0.0; self.space.ranges.len()];
+        rest.iter_mut().zip(&self.space.ranges).for_each(|(v, [low, high])| *v = v.clamp(*low, *high));
         let mut keys: Vec<Vec<f64>> = Vec::new();
         for (kind, height) in HEIGHTS.into_iter().enumerate() {
             for seed in std::iter::once(&rest).chain(self.by_extent(&surveyed, height)) {
@@ -155,7 +130,7 @@ impl Builder<'_> {
                     continue;
                 }
                 let folded = self.fold(seed.clone(), height);
-                if keys.iter().all(|key| self.time(key, &folded) > 4.0 * STEP_TIME) {
+                if keys.iter().all(|key| self.space.time(key, &folded) > 4.0 * STEP_TIME) {
                     keys.push(folded);
                 }
             }
@@ -166,7 +141,7 @@ impl Builder<'_> {
         let mut left = self.by_extent(&surveyed, HEIGHTS[0]);
         left.truncate(count / 2);
         while keys.len() < folded + spread && !left.is_empty() {
-            let apart = |q: &[f64]| keys.iter().map(|key| self.time(key, q)).fold(f64::INFINITY, f64::min);
+            let apart = |q: &[f64]| keys.iter().map(|key| self.space.time(key, q)).fold(f64::INFINITY, f64::min);
             let farthest = (0..left.len()).max_by(|a, b| apart(left[*a]).total_cmp(&apart(left[*b]))).unwrap_or(0);
             let q = left.swap_remove(farthest);
             if !self.touches(q) {
@@ -191,7 +166,7 @@ impl Builder<'_> {
             while gained {
                 gained = false;
                 for joint in 0..q.len() {
-                    let [low, high] = self.ranges[joint];
+                    let [low, high] = self.space.ranges[joint];
                     for step in [share, -share] {
                         let before = q[joint];
                         q[joint] = (before + step * (high - low)).clamp(low, high);
@@ -217,7 +192,7 @@ impl Builder<'_> {
         if asked.iter().all(Option::is_some) {
             return vec![with(&vec![0.0; asked.len()])];
         }
-        let more = (1..=self.size.open).map(|index| self.sample(index));
+        let more = (1..=self.size.open).map(|index| self.space.sample(index));
         folded.iter().cloned().chain(more).map(|own| with(&own)).take(self.size.open + folded.len() / 2).collect()
     }
 
@@ -236,7 +211,8 @@ impl Builder<'_> {
         };
         for a in 0..keys.len() {
             let mut others: Vec<usize> = (0..keys.len()).filter(|b| *b != a).collect();
-            others.sort_by(|b, c| self.time(&keys[a], &keys[*b]).total_cmp(&self.time(&keys[a], &keys[*c])));
+            others
+                .sort_by(|b, c| self.space.time(&keys[a], &keys[*b]).total_cmp(&self.space.time(&keys[a], &keys[*c])));
             let wanted = self.size.ways[usize::from(!is_end(a))];
             others.iter().filter(|b| **b >= folded).filter(|b| join(a, **b)).take(wanted).count();
             if is_end(a) || a < folded {
@@ -259,7 +235,7 @@ impl Builder<'_> {
         ends: [Vec<u32>; 2],
         ways: &[[usize; 2]],
     ) -> (Vec<Vec<f64>>, Roadmap) {
-        let times: Vec<f64> = ways.iter().map(|[a, b]| self.time(&keys[*a], &keys[*b])).collect();
+        let times: Vec<f64> = ways.iter().map(|[a, b]| self.space.time(&keys[*a], &keys[*b])).collect();
         let inner = |step: f64| times.iter().map(|time| (time / step).ceil().max(1.0) as usize - 1).sum::<usize>();
         let mut step = STEP_TIME;
         while keys.len() + inner(step) > self.size.most {
@@ -288,15 +264,11 @@ impl Builder<'_> {
     }
 }
 
-/// The posture so far on the straight way from one to another.
-fn between(a: &[f64], b: &[f64], share: f64) -> Vec<f64> {
-    a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::tests::arm;
     use super::*;
+    use crate::math::halton;
 
     const NEAR: [f64; 5] = [0.0; 5];
 

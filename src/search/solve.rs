@@ -308,7 +308,7 @@ fn with_way_out<const W: usize>(collider: &Collider<'_, W>, end: End, pose: Pose
     let way = Escape::new(collider.robot(), from, collider.standing(pose)).way(from, &to)?;
     // Half of the room that is left for each end.
     let room = (64 * W - postures.count()) / if end == End::Start { 2 } else { 1 };
-    Some(postures.with_way(&way, postures.count() + room))
+    Some(postures.with_way(&way, room))
 }
 
 /// Postures that are free in a pose and agree with what is asked for.
