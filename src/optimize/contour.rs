@@ -4,7 +4,8 @@
 //! that ball is clear. `slack` covers what interpolation may do to the bound.
 //!
 //! Upright boxes and cylinders of the base never change their height, so upright lines cover them: the least distance along a line
-//! is 1-Lipschitz in x and y.
+//! is 1-Lipschitz in x and y. What such a shape has drawn in over its rim, a table leg say, is far from all points of the rim again:
+//! balls inside the shape see it as deep as they are wide, and never ask for more than the rim does.
 
 use nalgebra::{Isometry3, Point3};
 
@@ -103,7 +104,7 @@ impl Reach {
 /// Contour points of the robot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contour {
-    /// One entry a collision shape.
+    /// One entry a collision shape, and after them the insides of some.
     pub shapes: Vec<ShapeContour>,
     /// All points; patches name ranges.
     pub points: Vec<ContourPoint>,
@@ -114,18 +115,29 @@ impl Contour {
     /// body is left out: the box is hit first.
     pub fn new(robot: &RobotModel, spacing: f64) -> Self {
         let mut contour = Self { shapes: Vec::new(), points: Vec::new() };
+        let mut inside = Vec::new();
         for (index, shape) in robot.shapes.iter().enumerate() {
-            let lines = if shape.body == 0 { upright_lines(robot, shape, spacing) } else { None };
-            let mut points = lines.unwrap_or_else(|| surface_points(&shape.convex, &shape.pose, spacing));
-            points.retain(|p| p.rise > 0.0 || !covered(robot, index, p));
-            let mut patches = Vec::new();
-            if !points.is_empty() {
-                split(&mut points, contour.points.len(), &mut patches);
-            }
-            contour.points.extend(points);
-            contour.shapes.push(ShapeContour { body: shape.body, patches });
+            let upright = if shape.body == 0 { Upright::new(robot, shape) } else { None };
+            let Some(upright) = upright else {
+                let mut points = surface_points(&shape.convex, &shape.pose, spacing);
+                points.retain(|p| !covered(robot, index, p));
+                contour.add(shape.body, points);
+                continue;
+            };
+            contour.add(shape.body, upright.lines(spacing));
+            inside.push(upright.inside(spacing));
         }
+        inside.into_iter().filter(|balls| !balls.is_empty()).for_each(|balls| contour.add(0, balls));
         contour
+    }
+
+    fn add(&mut self, body: usize, mut points: Vec<ContourPoint>) {
+        let mut patches = Vec::new();
+        if !points.is_empty() {
+            split(&mut points, self.points.len(), &mut patches);
+        }
+        self.points.extend(points);
+        self.shapes.push(ShapeContour { body, patches });
     }
 }
 
@@ -146,31 +158,101 @@ fn covered(robot: &RobotModel, own: usize, point: &ContourPoint) -> bool {
 /// Cosine of an angle that counts as upright.
 const UPRIGHT: f64 = 1.0 - 1e-9;
 
-/// Lines that cover a box or cylinder of the base that stands upright.
-fn upright_lines(robot: &RobotModel, shape: &Shape, spacing: f64) -> Option<Vec<ContourPoint>> {
-    let origin = robot.bodies[0].origin;
-    let pose = origin * shape.pose;
-    let axis = |k: usize| pose.rotation.to_rotation_matrix()[(2, k)].abs();
-    let (feet, half_height): (Vec<[f64; 3]>, f64) = match &shape.convex {
-        Convex::Box { half } => {
-            let up = (0..3).find(|k| axis(*k) > UPRIGHT)?;
-            let (a, b) = ((up + 1) % 3, (up + 2) % 3);
-            let place = |[u, v]: [f64; 2]| {
-                let mut foot = [0.0; 3];
-                (foot[a], foot[b]) = (u, v);
-                foot
-            };
-            (rectangle_points([half[a], half[b]], spacing).into_iter().map(place).collect(), half[up])
+/// A box or cylinder of the base that stands upright.
+struct Upright {
+    /// From its own axes to the map's, but for the base's pose.
+    pose: Isometry3<f64>,
+    /// From the base's body to the same.
+    origin: Isometry3<f64>,
+    plan: Plan,
+    half_height: f64,
+}
+
+/// What an upright shape looks like from above.
+enum Plan {
+    /// Along two of its axes.
+    Rectangle {
+        axes: [usize; 2],
+        half: [f64; 2],
+    },
+    Disc {
+        radius: f64,
+    },
+}
+
+impl Upright {
+    fn new(robot: &RobotModel, shape: &Shape) -> Option<Self> {
+        let origin = robot.bodies[0].origin;
+        let pose = origin * shape.pose;
+        let axis = |k: usize| pose.rotation.to_rotation_matrix()[(2, k)].abs();
+        let (plan, half_height) = match &shape.convex {
+            Convex::Box { half } => {
+                let up = (0..3).find(|k| axis(*k) > UPRIGHT)?;
+                let axes = [(up + 1) % 3, (up + 2) % 3];
+                (Plan::Rectangle { axes, half: axes.map(|a| half[a]) }, half[up])
+            }
+            Convex::Cylinder { radius, half_length } if axis(2) > UPRIGHT => {
+                (Plan::Disc { radius: *radius }, *half_length)
+            }
+            _ => return None,
+        };
+        Some(Self { pose, origin, plan, half_height })
+    }
+
+    /// Upright lines that cover it.
+    fn lines(&self, spacing: f64) -> Vec<ContourPoint> {
+        let feet: Vec<[f64; 3]> = match &self.plan {
+            Plan::Rectangle { axes, half } => {
+                rectangle_points(*half, spacing).into_iter().map(|at| on_axes(*axes, at)).collect()
+            }
+            Plan::Disc { radius } => disc_points(*radius, spacing),
+        };
+        let weight = 0.5 * (steps(2.0 * self.half_height, spacing) + 1) as f64;
+        feet.into_iter().map(|foot| self.line(foot, 0.0, weight)).collect()
+    }
+
+    /// Balls inside it, slid up and down as far as they stay inside, so close that none of its inside is further from them than they
+    /// reach; none where they would be smaller than what the rim sees.
+    fn inside(&self, spacing: f64) -> Vec<ContourPoint> {
+        let least = match &self.plan {
+            Plan::Rectangle { half, .. } => half[0].min(half[1]),
+            Plan::Disc { radius } => *radius,
+        };
+        let radius = self.half_height.min(0.5 * least);
+        if radius < spacing {
+            return Vec::new();
         }
-        Convex::Cylinder { radius, half_length } if axis(2) > UPRIGHT => (disc_points(*radius, spacing), *half_length),
-        _ => return None,
-    };
-    let weight = 0.5 * (steps(2.0 * half_height, spacing) + 1) as f64;
-    let line = |foot: [f64; 3]| {
-        let at = pose * Point3::from(foot) - nalgebra::Vector3::z() * half_height;
-        ContourPoint { at: origin.inverse_transform_point(&at), radius: 0.0, rise: 2.0 * half_height, weight }
-    };
-    Some(feet.into_iter().map(line).collect())
+        let apart = INSIDE * radius;
+        let feet: Vec<[f64; 3]> = match &self.plan {
+            Plan::Rectangle { axes, half } => {
+                let half = half.map(|h| h - radius);
+                let n = half.map(|h| steps(2.0 * h, apart));
+                let place = |index: [usize; 2]| [0, 1].map(|a| half[a] * (2.0 * index[a] as f64 / n[a] as f64 - 1.0));
+                let all = (0..=n[0]).flat_map(|i| (0..=n[1]).map(move |j| [i, j]));
+                all.map(|index| on_axes(*axes, place(index))).collect()
+            }
+            Plan::Disc { radius: whole } => disc_points(whole - radius, 0.5 * apart),
+        };
+        // As many points as the lines that they stand beside.
+        let weight = 0.5 * (steps(2.0 * self.half_height, spacing) + 1) as f64;
+        feet.into_iter().map(|foot| self.line(foot, radius, weight)).collect()
+    }
+
+    /// A line from bottom to top, but for a radius at both ends.
+    fn line(&self, foot: [f64; 3], radius: f64, weight: f64) -> ContourPoint {
+        let half = (self.half_height - radius).max(0.0);
+        let at = self.pose * Point3::from(foot) - nalgebra::Vector3::z() * half;
+        ContourPoint { at: self.origin.inverse_transform_point(&at), radius, rise: 2.0 * half, weight }
+    }
+}
+
+/// Balls inside a shape are so many of their radii apart: a square of them leaves no hole.
+const INSIDE: f64 = 1.4;
+
+fn on_axes(axes: [usize; 2], at: [f64; 2]) -> [f64; 3] {
+    let mut place = [0.0; 3];
+    (place[axes[0]], place[axes[1]]) = (at[0], at[1]);
+    place
 }
 
 fn surface_points(convex: &Convex, pose: &Isometry3<f64>, spacing: f64) -> Vec<ContourPoint> {
@@ -406,7 +488,7 @@ mod tests {
         robot.bodies[0].origin = Isometry3::translation(0.0, 0.0, 0.05);
         let cylinder = Shape { convex: Convex::Cylinder { radius: 0.2, half_length: 0.3 }, ..upright([0.1; 3]) };
         for (shape, half_height) in [(upright([0.21, 0.17, 0.3]), 0.3), (cylinder, 0.3)] {
-            let lines = upright_lines(&robot, &shape, 0.05).expect("it stands upright");
+            let lines = Upright::new(&robot, &shape).expect("it stands upright").lines(0.05);
             let mut feet: Vec<[f64; 3]> = lines.iter().map(|p| p.at.into()).collect();
             for line in &lines {
                 assert!((line.rise - 2.0 * half_height).abs() < 1e-12 && (line.at.z - 0.1).abs() < 1e-12);
@@ -428,7 +510,57 @@ mod tests {
         }
         let mut tilted = upright([0.1; 3]);
         tilted.pose.rotation = nalgebra::UnitQuaternion::from_euler_angles(0.1, 0.0, 0.0);
-        assert_eq!(upright_lines(&robot, &tilted, 0.05), None);
+        assert!(Upright::new(&robot, &tilted).is_none());
+    }
+
+    #[test]
+    fn balls_fill_an_upright_shape_and_stay_inside_it() {
+        let robot = crate::optimize::test_robot::robot(0);
+        let cylinder = Shape { convex: Convex::Cylinder { radius: 0.4, half_length: 0.1 }, ..upright([0.1; 3]) };
+        for shape in [upright([0.21, 0.17, 0.3]), upright([0.5, 0.3, 0.1]), cylinder] {
+            let balls = Upright::new(&robot, &shape).expect("it stands upright").inside(0.05);
+            let radius = balls[0].radius;
+            let spine = |ball: &ContourPoint, p: Point3<f64>| {
+                let up = (p.z - ball.at.z).clamp(0.0, ball.rise);
+                (p - ball.at - nalgebra::Vector3::z() * up).norm()
+            };
+            let place = |u: f64, v: f64| {
+                let at = match &shape.convex {
+                    Convex::Cylinder { radius, .. } => {
+                        [radius * u * (std::f64::consts::PI * v).cos(), radius * u * (std::f64::consts::PI * v).sin()]
+                    }
+                    Convex::Box { half } => [u * half[0], v * half[1]],
+                    other => panic!("{other:?}"),
+                };
+                shape.pose * Point3::new(at[0], at[1], 0.0)
+            };
+            for i in -20..=20 {
+                for j in -20..=20 {
+                    // On the middle of its height, but for what the rim's lines see.
+                    let p = place(0.85 * f64::from(i) / 20.0, 0.85 * f64::from(j) / 20.0);
+                    let nearest = balls.iter().map(|b| spine(b, p)).fold(f64::INFINITY, f64::min);
+                    assert!(nearest <= radius + 0.01, "{p:?} is {nearest} m from all, {radius} m wide, of {shape:?}");
+                }
+            }
+            for ball in &balls {
+                for way in directions(50) {
+                    for end in [0.0, ball.rise] {
+                        let p = ball.at + nalgebra::Vector3::z() * end + way * radius;
+                        let q = shape.pose.inverse_transform_point(&p);
+                        let inside = match &shape.convex {
+                            Convex::Cylinder { radius, half_length } => {
+                                q.x.hypot(q.y).max(q.z.abs() + radius - half_length) <= radius + 1e-9
+                            }
+                            Convex::Box { half } => (0..3).all(|k| q[k].abs() <= half[k] + 1e-9),
+                            other => panic!("{other:?}"),
+                        };
+                        assert!(inside, "{q:?}");
+                    }
+                }
+            }
+        }
+        let flat = upright([0.3, 0.2, 0.02]);
+        assert!(Upright::new(&robot, &flat).expect("upright").inside(0.05).is_empty());
     }
 
     #[test]

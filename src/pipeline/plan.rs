@@ -24,6 +24,44 @@ const FIRST_MARGIN: f64 = 0.013;
 const MISSED_TIMES: f64 = 1.5;
 /// What counts of it at most, m.
 const MISSED_MOST: f64 = 0.015;
+/// Distance below which a motion runs through an obstacle rather than too near it, m.
+const DEEP: f64 = -0.05;
+
+/// Which tries of the optimiser.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Tries {
+    /// Those that mostly succeed.
+    Soon,
+    /// The others.
+    Late,
+    All,
+}
+
+/// How many mostly succeed.
+const SOON: usize = 3;
+
+impl Tries {
+    /// Of a parameterisation that is asked for: what to optimise, with how much margin (m), and how.
+    fn of(self, asked: Parameterisation) -> Vec<(Parameterisation, f64, Look)> {
+        // Where one parameterisation fails at every margin, the other may not.
+        let other = (asked == Parameterisation::ArcLength).then_some(Parameterisation::Flat);
+        // A motion that misses its clearance by little is looked at more closely, then from the beginning, then asked for more.
+        let of = |p: Parameterisation| match p {
+            Parameterisation::Flat => OPTIMISER_MARGINS.map(|margin| (p, margin, Look::First)).to_vec(),
+            Parameterisation::ArcLength => {
+                let closer = OPTIMISER_MARGINS.map(|margin| (p, margin, Look::Closer));
+                [(p, FIRST_MARGIN, Look::First), (p, FIRST_MARGIN, Look::Again)].into_iter().chain(closer).collect()
+            }
+        };
+        let mut all: Vec<_> = [asked].into_iter().chain(other).flat_map(of).collect();
+        let late = all.split_off(SOON.min(all.len()));
+        match self {
+            Self::Soon => all,
+            Self::Late => late,
+            Self::All => [all, late].concat(),
+        }
+    }
+}
 
 /// How a try of the optimiser goes about it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,22 +88,26 @@ pub(super) fn plan(
     let path = route(run, finish, map, compile, &query).map_err(|error| place_search_error(finish.mission, &error))?;
     note(run, &path, finish.robot);
     let task = |trajectory: &Trajectory| finish.task(trajectory);
-    let made = optimise(run, finish, map, compile, &path, &task);
-    if made.as_ref().is_ok_and(|made| made.certificate.holds()) {
-        return made;
+    if !search::has_more_postures(finish.robot) {
+        return optimise(run, finish, map, compile, &path, &task);
+    }
+    if let Some(made) = attempt(run, finish, map, compile, &path, Tries::Soon, &task) {
+        return Ok(made);
     }
     // Between the postures that were sampled something may have been in the way: another path leads by others.
     let field = map.field(compile.threads);
     let options = search_options(finish.mission, SEARCH_MARGIN);
     let other = run.stage("search", || search::with_more_postures(map, field, finish.robot, &query, &options));
-    let Some(other) = other else { return made };
-    match optimise(run, finish, map, compile, &other, &task) {
-        Ok(better) if better.certificate.holds() => {
-            note(run, &other, finish.robot);
-            Ok(better)
-        }
-        _ => made,
+    if let Some(other) = other
+        && let Some(made) = attempt(run, finish, map, compile, &other, Tries::Soon, &task)
+    {
+        note(run, &other, finish.robot);
+        return Ok(made);
     }
+    if let Some(made) = attempt(run, finish, map, compile, &path, Tries::Late, &task) {
+        return Ok(made);
+    }
+    as_searched(run, finish, &path, &task)
 }
 
 fn search_options(mission: &Mission, margin: f64) -> SearchOptions {
@@ -108,30 +150,46 @@ pub(super) fn optimise(
     path: &SearchPath,
     task: &dyn Fn(&Trajectory) -> Task,
 ) -> Result<Made, Diagnostics> {
-    let (mission, robot) = (finish.mission, finish.robot);
-    let asked = compile.parameterisation.unwrap_or(mission.parameterisation);
-    let field = map.field(compile.threads);
-    let certify = |run: &mut Run<'_>, trajectory: Trajectory| {
-        let task = task(&trajectory);
-        finish.certify_task(run, trajectory, &task)
-    };
-    if path.length() == 0.0 {
-        return certify(run, path.trajectory());
+    match attempt(run, finish, map, compile, path, Tries::All, task) {
+        Some(made) => Ok(made),
+        None => as_searched(run, finish, path, task),
     }
-    // Where one parameterisation fails at every margin, the other may not.
-    let other = (asked == Parameterisation::ArcLength).then_some(Parameterisation::Flat);
-    // A motion that misses its clearance by little is looked at more closely, then from the beginning, then asked for more.
-    let of = |p: Parameterisation| match p {
-        Parameterisation::Flat => OPTIMISER_MARGINS.map(|margin| (p, margin, Look::First)).to_vec(),
-        Parameterisation::ArcLength => {
-            let closer = OPTIMISER_MARGINS.map(|margin| (p, margin, Look::Closer));
-            [(p, FIRST_MARGIN, Look::First), (p, FIRST_MARGIN, Look::Again)].into_iter().chain(closer).collect()
-        }
-    };
+}
+
+/// The path's own motion.
+fn as_searched(
+    run: &mut Run<'_>,
+    finish: &Finish<'_>,
+    path: &SearchPath,
+    task: &dyn Fn(&Trajectory) -> Task,
+) -> Result<Made, Diagnostics> {
+    let trajectory = path.trajectory();
+    let task = task(&trajectory);
+    finish.certify_task(run, trajectory, &task)
+}
+
+/// The first motion along a path that is certified to do its task.
+fn attempt(
+    run: &mut Run<'_>,
+    finish: &Finish<'_>,
+    map: &Place,
+    compile: &CompileOptions,
+    path: &SearchPath,
+    which: Tries,
+    task: &dyn Fn(&Trajectory) -> Task,
+) -> Option<Made> {
+    if path.length() == 0.0 {
+        return None;
+    }
+    let (mission, robot) = (finish.mission, finish.robot);
+    let field = map.field(compile.threads);
     let mut refused: Option<Trajectory> = None;
-    let mut missed = 0.0f64;
-    let tries = [asked].into_iter().chain(other).flat_map(of);
-    for (parameterisation, margin, look) in tries {
+    let (mut missed, mut deep) = (0.0f64, false);
+    for (parameterisation, margin, look) in which.of(compile.parameterisation.unwrap_or(mission.parameterisation)) {
+        // A motion on the wrong side of something stays there.
+        if deep && look == Look::Again {
+            continue;
+        }
         let usual = if compile.spins { OptimizeOptions::default() } else { OptimizeOptions::without_spins() };
         let clearance = mission.clearance + margin;
         let mut options = OptimizeOptions { parameterisation, clearance, dense: compile.dense, ..usual };
@@ -144,16 +202,19 @@ pub(super) fn optimise(
             None => optimize::optimize(path, field, robot, &options),
         });
         refused = Some(trajectory.clone());
+        let task = task(&trajectory);
+        let made = finish.certify_task(run, trajectory, &task);
         // A trajectory that no law can time is one more reason to go on to the next try.
-        let Ok(made) = certify(run, trajectory) else { continue };
+        let Ok(made) = made else { continue };
         if made.certificate.holds() {
-            return Ok(made);
+            return Some(made);
         }
         if let Some(closest) = &made.certificate.closest {
             missed = missed.max((mission.clearance - closest.distance).clamp(0.0, MISSED_MOST));
+            deep = closest.distance < DEEP;
         }
     }
-    certify(run, path.trajectory())
+    None
 }
 
 /// What the search is asked.

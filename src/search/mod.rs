@@ -149,6 +149,11 @@ pub fn with_more_postures(
     quick::<{ posture::MOST_POSTURES / 64 }>(problem, postures)
 }
 
+/// Whether [`with_more_postures`] knows more of a robot than [`search`] looks at first.
+pub fn has_more_postures(robot: &RobotModel) -> bool {
+    Postures::levels(robot) > 1
+}
+
 /// A path with these postures, where one is found soon.
 fn quick<const W: usize>(problem: Problem<'_>, postures: Postures) -> Option<SearchPath> {
     Solver::<W>::new(problem, postures).ok()?.guided()

@@ -66,9 +66,10 @@ impl Default for SteerOptions {
 }
 
 impl SteerOptions {
-    /// For a motion that was refused: looks twice as often, and pays four times as much for clearance.
+    /// For a motion that was refused: looks twice as often, and pays four times as much for clearance and limits.
     pub fn closer(&self) -> Self {
         Self {
+            motion_weight: 4.0 * self.motion_weight,
             clearance_weight: 4.0 * self.clearance_weight,
             sample_distance: 0.5 * self.sample_distance,
             sample_time: 0.5 * self.sample_time,
