@@ -28,18 +28,20 @@ pub(super) fn signed_distance(map: &VoxelMap, nodes: [usize; 3], threads: usize)
     let [nx, ny, nz] = nodes;
     let size = ny * nz;
     let mut values = vec![0.0f32; nx * size];
-    let parts = Parts::new(ny, nz, threads);
+    let levels = Levels::of(map);
+    let parts = Parts::new(ny, levels.rows.len(), threads);
+    let known = ny * levels.rows.len();
     let shares = shares(nx, threads, 1);
-    let forwards = sweep_forwards(map, &parts, &shares, &mut values);
+    let forwards = sweep_forwards(map, &levels, &parts, &shares, &mut values);
     let solids: Vec<bool> = (0..nx).map(|i| forwards.iter().any(|part| part.solids[i])).collect();
     // The slabs of each share, from the last one on, and what the pass backwards brings into it.
     let work = |share: &Range<usize>, slabs: &mut [f32], after: Option<Vec<f32>>| {
-        let mut inner = Slabs::new(map, parts.clone());
+        let mut inner = Slabs::new(map, &levels, parts.clone());
         let mut after =
-            after.unwrap_or_else(|| slabs[slabs.len() - size..].iter().map(|steps| steps * NEVER).collect());
+            after.unwrap_or_else(|| slabs[slabs.len() - size..][..known].iter().map(|steps| steps * NEVER).collect());
         for (i, slab) in share.clone().zip(slabs.chunks_exact_mut(size)).rev() {
             if i + 1 < nx {
-                step_back(slab, &mut after);
+                step_back(&slab[..known], &mut after);
             }
             let edge = if map.outside == Unknown::Occupied { i.min(nx - 1 - i) as f32 } else { f32::INFINITY };
             inner.outside(slab, &after, edge);
@@ -63,21 +65,58 @@ pub(super) fn signed_distance(map: &VoxelMap, nodes: [usize; 3], threads: usize)
     values
 }
 
-/// Parts of slabs along y: part p holds nodes `along_y[p]`, row by row, where a slab of one part would hold them.
+/// Rows of nodes that are alike in every slab, and so are all that comes of them along x and y: done once. Nothing reaches as
+/// high as most maps do, and above it all is free.
+struct Levels {
+    /// The lowest row of each level.
+    rows: Vec<usize>,
+    /// The level of each row.
+    of: Vec<usize>,
+}
+
+impl Levels {
+    fn of(map: &VoxelMap) -> Self {
+        // Bit k: cells k differ from cells k - 1 somewhere. All are free below and above the grid.
+        let words = map.dims[2].div_ceil(64);
+        let mut differ = vec![0u64; words + 1];
+        for i in 0..map.dims[0] {
+            for j in 0..map.dims[1] {
+                let mut below = 0;
+                for (differ, bits) in differ.iter_mut().zip(map.column(i, j)) {
+                    *differ |= bits ^ (bits << 1 | below);
+                    below = bits >> 63;
+                }
+                differ[words] |= below;
+            }
+        }
+        let differs = |k: usize| differ[k / 64] >> (k % 64) & 1 != 0;
+        let (mut rows, mut of) = (vec![0], vec![0]);
+        for k in 1..=map.dims[2] {
+            // Node k lies between cells k - 1 and k.
+            if differs(k) || differs(k - 1) {
+                rows.push(k);
+            }
+            of.push(rows.len() - 1);
+        }
+        Self { rows, of }
+    }
+}
+
+/// Parts of slabs along y: part p holds nodes `along_y[p]`, level by level, where a slab of one part would hold them.
 #[derive(Clone)]
 struct Parts {
     along_y: Vec<Range<usize>>,
-    nz: usize,
+    levels: usize,
 }
 
 impl Parts {
-    fn new(ny: usize, nz: usize, threads: usize) -> Self {
-        Self { along_y: shares(ny, threads, LANES), nz }
+    fn new(ny: usize, levels: usize, threads: usize) -> Self {
+        Self { along_y: shares(ny, threads, LANES), levels }
     }
 
     /// Where in a slab part p lies.
     fn range(&self, p: usize) -> Range<usize> {
-        self.along_y[p].start * self.nz..self.along_y[p].end * self.nz
+        self.along_y[p].start * self.levels..self.along_y[p].end * self.levels
     }
 }
 
@@ -97,8 +136,15 @@ struct Forwards {
 }
 
 /// Steps forwards, into `values`.
-fn sweep_forwards(map: &VoxelMap, parts: &Parts, shares: &[Range<usize>], values: &mut [f32]) -> Vec<Forwards> {
-    let size = parts.range(parts.along_y.len() - 1).end;
+fn sweep_forwards(
+    map: &VoxelMap,
+    levels: &Levels,
+    parts: &Parts,
+    shares: &[Range<usize>],
+    values: &mut [f32],
+) -> Vec<Forwards> {
+    let nz = map.dims[2] + 1;
+    let size = (map.dims[1] + 1) * nz;
     let mut columns: Vec<Vec<&mut [f32]>> =
         parts.along_y.iter().map(|_| Vec::with_capacity(values.len() / size)).collect();
     for slab in values.chunks_exact_mut(size) {
@@ -110,15 +156,15 @@ fn sweep_forwards(map: &VoxelMap, parts: &Parts, shares: &[Range<usize>], values
         }
     }
     let sweep = |p: usize, mut slabs: Vec<&mut [f32]>| {
-        let (along_y, nz) = (parts.along_y[p].clone(), parts.nz);
+        let along_y = parts.along_y[p].clone();
         let (ny, mut kinds) = (along_y.len(), Kinds::new(along_y, nz));
         let mut solids = vec![false; slabs.len()];
         for (i, solid) in solids.iter_mut().enumerate() {
             *solid = kinds.read(map, i);
             let (done, slab) = slabs.split_at_mut(i);
-            for k in 0..nz {
-                let row = k * ny..(k + 1) * ny;
-                step(&mut slab[0][row.clone()], kinds.row(k), done.last().map(|before| &before[row]));
+            for (level, k) in levels.rows.iter().enumerate() {
+                let row = level * ny..(level + 1) * ny;
+                step(&mut slab[0][row.clone()], kinds.row(*k), done.last().map(|before| &before[row]));
             }
         }
         let mut after = vec![Vec::new(); shares.len() - 1];
@@ -186,6 +232,8 @@ struct Slabs {
     size: [usize; 2],
     stride: usize,
     resolution: f32,
+    /// Squared distances of the levels, then of all rows.
+    along_x: Vec<f32>,
     squares: Vec<f32>,
     metres: Vec<f32>,
     /// Distance to the grid's edges along y, cells.
@@ -195,23 +243,23 @@ struct Slabs {
 }
 
 impl Slabs {
-    fn new(map: &VoxelMap, parts: Parts) -> Self {
-        let (ny, nz) = (map.dims[1] + 1, parts.nz);
+    fn new(map: &VoxelMap, levels: &Levels, parts: Parts) -> Self {
+        let [ny, nz] = [map.dims[1] + 1, map.dims[2] + 1];
         let stride = ny.next_multiple_of(LANES);
         // Infinite where the edge is no wall.
         let walled = map.outside == Unknown::Occupied;
         let edge = |j: usize| if walled { j.min(ny - 1 - j) as f32 } else { f32::INFINITY };
         let edges: Vec<f32> = (0..ny).map(edge).collect();
         let squares = vec![0.0; stride * nz];
-        let metres = squares.clone();
         Self {
-            lines: Lines::new([ny, nz]),
+            lines: Lines::new(ny, &levels.of),
             parts,
             size: [ny, nz],
             stride,
             resolution: map.resolution as f32,
+            along_x: vec![0.0; stride * levels.rows.len()],
+            metres: squares.clone(),
             squares,
-            metres,
             bounds: edges.clone(),
             edges,
         }
@@ -220,7 +268,7 @@ impl Slabs {
     /// Distance to the nearest site and, where `edge` is finite, to the grid's edge; `edge` is that along x, cells.
     fn outside(&mut self, forwards: &[f32], after: &[f32], edge: f32) {
         self.squares(forwards, after, 1.0);
-        self.lines.transform(&mut self.squares);
+        self.lines.transform(&mut self.along_x, &mut self.squares);
         for (bound, along) in self.bounds.iter_mut().zip(&self.edges) {
             *bound = if *along < edge { *along } else { edge } * self.resolution;
         }
@@ -231,7 +279,7 @@ impl Slabs {
     /// Subtracts the depth of the nodes inside: the distance to the nearest node that is not.
     fn inside(&mut self, forwards: &[f32], after: &[f32]) {
         self.squares(forwards, after, -1.0);
-        self.lines.transform(&mut self.squares);
+        self.lines.transform(&mut self.along_x, &mut self.squares);
         subtract_depth(&mut self.metres, &self.squares, self.resolution);
     }
 
@@ -240,7 +288,7 @@ impl Slabs {
         for (p, along_y) in self.parts.along_y.iter().enumerate() {
             let (part, length) = (self.parts.range(p), along_y.len());
             let steps = forwards[part.clone()].chunks_exact(length).zip(after[part].chunks_exact(length));
-            for (row, (forwards, after)) in self.squares.chunks_exact_mut(self.stride).zip(steps) {
+            for (row, (forwards, after)) in self.along_x.chunks_exact_mut(self.stride).zip(steps) {
                 nearest(&mut row[along_y.clone()], forwards, after, sign);
             }
         }
