@@ -69,6 +69,10 @@ impl Lines {
         }
     }
 
+    pub(super) fn level_of(&self) -> &[usize] {
+        &self.level_of
+    }
+
     /// Transforms the rows given, each standing for one row or more of the slab; then the slab along its columns.
     pub(super) fn transform(&mut self, levels: &mut [f32], slab: &mut [f32]) {
         let [ny, nz] = self.size;

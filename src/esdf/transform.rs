@@ -23,6 +23,10 @@ use crate::mission::Unknown;
 /// Steps of a node with no site on its line; one more is lost in rounding. (2^24; its square is above `NONE`.)
 const NEVER: f32 = 16_777_216.0;
 
+/// Nodes along y and rows that are turned to the layout of the field together.
+const TILE: usize = 4;
+type Tile = [f32; TILE];
+
 /// Signed distances (m) at all nodes, by so many threads (at least 1).
 pub(super) fn signed_distance(map: &VoxelMap, nodes: [usize; 3], threads: usize) -> Vec<f32> {
     let [nx, ny, nz] = nodes;
@@ -44,11 +48,9 @@ pub(super) fn signed_distance(map: &VoxelMap, nodes: [usize; 3], threads: usize)
                 step_back(&slab[..known], &mut after);
             }
             let edge = if map.outside == Unknown::Occupied { i.min(nx - 1 - i) as f32 } else { f32::INFINITY };
-            inner.outside(slab, &after, edge);
-            if solids[i] {
-                inner.inside(slab, &after);
-            }
-            inner.write(slab);
+            inner.outside(&slab[..known], &after);
+            let depths = if solids[i] { inner.inside(&slab[..known], &after) } else { 0..0 };
+            inner.write(slab, edge, depths);
         }
     };
     let after = |share: usize| {
@@ -235,7 +237,7 @@ struct Slabs {
     /// Squared distances of the levels, then of all rows.
     along_x: Vec<f32>,
     squares: Vec<f32>,
-    metres: Vec<f32>,
+    depths: Vec<f32>,
     /// Distance to the grid's edges along y, cells.
     edges: Vec<f32>,
     /// Distance to the grid's edges in this slab, m.
@@ -249,7 +251,7 @@ impl Slabs {
         // Infinite where the edge is no wall.
         let walled = map.outside == Unknown::Occupied;
         let edge = |j: usize| if walled { j.min(ny - 1 - j) as f32 } else { f32::INFINITY };
-        let edges: Vec<f32> = (0..ny).map(edge).collect();
+        let edges: Vec<f32> = (0..stride).map(|j| edge(j.min(ny - 1))).collect();
         let squares = vec![0.0; stride * nz];
         Self {
             lines: Lines::new(ny, &levels.of),
@@ -258,33 +260,32 @@ impl Slabs {
             stride,
             resolution: map.resolution as f32,
             along_x: vec![0.0; stride * levels.rows.len()],
-            metres: squares.clone(),
+            depths: squares.clone(),
             squares,
             bounds: edges.clone(),
             edges,
         }
     }
 
-    /// Distance to the nearest site and, where `edge` is finite, to the grid's edge; `edge` is that along x, cells.
-    fn outside(&mut self, forwards: &[f32], after: &[f32], edge: f32) {
-        self.squares(forwards, after, 1.0);
+    /// Squared distance to the nearest site.
+    fn outside(&mut self, forwards: &[f32], after: &[f32]) {
+        self.along_x(forwards, after, 1.0);
         self.lines.transform(&mut self.along_x, &mut self.squares);
-        for (bound, along) in self.bounds.iter_mut().zip(&self.edges) {
-            *bound = if *along < edge { *along } else { edge } * self.resolution;
-        }
-        let rows = self.metres.chunks_exact_mut(self.stride).zip(self.squares.chunks_exact(self.stride));
-        rows.for_each(|(metres, squares)| to_metres(metres, squares, &self.bounds, self.resolution));
     }
 
-    /// Subtracts the depth of the nodes inside: the distance to the nearest node that is not.
-    fn inside(&mut self, forwards: &[f32], after: &[f32]) {
-        self.squares(forwards, after, -1.0);
-        self.lines.transform(&mut self.along_x, &mut self.squares);
-        subtract_depth(&mut self.metres, &self.squares, self.resolution);
+    /// Squared depth of the nodes inside: to the nearest node that is not. All of them are in these rows.
+    fn inside(&mut self, forwards: &[f32], after: &[f32]) -> Range<usize> {
+        self.along_x(forwards, after, -1.0);
+        let mut levels = self.along_x.chunks_exact(self.stride).map(any_above_zero);
+        let first = levels.position(|deep| deep).unwrap_or(0);
+        let last = levels.rposition(|deep| deep).map_or(first, |more| first + 1 + more);
+        self.lines.transform(&mut self.along_x, &mut self.depths);
+        let levels = self.lines.level_of();
+        levels.partition_point(|level| *level < first)..levels.partition_point(|level| *level <= last)
     }
 
     /// Squared distance along x for the nodes whose steps have this sign, 0 for all others.
-    fn squares(&mut self, forwards: &[f32], after: &[f32], sign: f32) {
+    fn along_x(&mut self, forwards: &[f32], after: &[f32], sign: f32) {
         for (p, along_y) in self.parts.along_y.iter().enumerate() {
             let (part, length) = (self.parts.range(p), along_y.len());
             let steps = forwards[part.clone()].chunks_exact(length).zip(after[part].chunks_exact(length));
@@ -294,11 +295,33 @@ impl Slabs {
         }
     }
 
-    /// To the layout of the field: z fastest.
-    fn write(&self, slab: &mut [f32]) {
-        for (j, column) in slab.chunks_exact_mut(self.size[1]).enumerate() {
-            for (value, metres) in column.iter_mut().zip(self.metres[j..].iter().step_by(self.stride)) {
-                *value = *metres;
+    /// Metres, in the layout of the field: z fastest. `edge`: distance to the grid's edge along x, cells, or infinite.
+    fn write(&mut self, slab: &mut [f32], edge: f32, depths: Range<usize>) {
+        let [ny, nz] = self.size;
+        for (bound, along) in self.bounds.iter_mut().zip(&self.edges) {
+            *bound = if *along < edge { *along } else { edge } * self.resolution;
+        }
+        for (k, row) in self.squares.chunks_exact_mut(self.stride).enumerate() {
+            to_metres(row, &self.bounds, self.resolution);
+            if depths.contains(&k) {
+                subtract_depth(row, &self.depths[k * self.stride..][..self.stride], self.resolution);
+            }
+        }
+        let metres = |k: usize, at: usize| -> Tile {
+            self.squares[k * self.stride + at..][..TILE].try_into().expect("as long as a tile")
+        };
+        for (columns, at) in slab.chunks_mut(TILE * nz).zip((0..).step_by(TILE)) {
+            let whole = if at + TILE <= ny { nz / TILE * TILE } else { 0 };
+            for k in (0..whole).step_by(TILE) {
+                let [a, b, c, d] = [metres(k, at), metres(k + 1, at), metres(k + 2, at), metres(k + 3, at)];
+                columns[k..][..TILE].copy_from_slice(&[a[0], b[0], c[0], d[0]]);
+                columns[nz + k..][..TILE].copy_from_slice(&[a[1], b[1], c[1], d[1]]);
+                columns[2 * nz + k..][..TILE].copy_from_slice(&[a[2], b[2], c[2], d[2]]);
+                columns[3 * nz + k..][..TILE].copy_from_slice(&[a[3], b[3], c[3], d[3]]);
+            }
+            for k in whole..nz {
+                let metres = metres(k, at);
+                columns.chunks_exact_mut(nz).zip(metres).for_each(|(column, metres)| column[k] = metres);
             }
         }
     }
@@ -315,10 +338,10 @@ fn nearest(squares: &mut [f32], forwards: &[f32], after: &[f32], sign: f32) {
 }
 
 #[inline(never)]
-fn to_metres(metres: &mut [f32], squares: &[f32], bounds: &[f32], resolution: f32) {
-    for ((metres, square), bound) in metres.iter_mut().zip(squares).zip(bounds) {
-        let distance = if *square >= NONE { FAR } else { square.sqrt() * resolution };
-        *metres = if distance < *bound { distance } else { *bound };
+fn to_metres(squares: &mut [f32], bounds: &[f32], resolution: f32) {
+    for (value, bound) in squares.iter_mut().zip(bounds) {
+        let distance = if *value >= NONE { FAR } else { value.sqrt() * resolution };
+        *value = if distance < *bound { distance } else { *bound };
     }
 }
 
@@ -327,4 +350,10 @@ fn subtract_depth(metres: &mut [f32], squares: &[f32], resolution: f32) {
     for (metres, square) in metres.iter_mut().zip(squares) {
         *metres -= if *square >= NONE { FAR } else { square.sqrt() * resolution };
     }
+}
+
+/// Whether a square is not 0; without an early end, so that it runs in blocks.
+#[inline(never)]
+fn any_above_zero(squares: &[f32]) -> bool {
+    squares.iter().fold(0, |any, square| any | square.to_bits()) != 0
 }
