@@ -3,7 +3,7 @@
 //! `field NX NY NZ RESOLUTION FILE`: the file holds a byte a voxel, z fastest, not 0 where occupied. Every line read from stdin is a
 //! command, answered by a line:
 //!
-//! - `signed THREADS`: builds the field; wall and processor time in s.
+//! - `field THREADS`: builds the field; wall time, and processor time of the first thread, in s.
 //! - `write FILE`: the last field's values at the nodes, f32, z fastest.
 
 use std::io::BufRead;
@@ -48,7 +48,7 @@ fn main() {
     }
 }
 
-/// Of this process, s; to a tick.
+/// Of this thread, s; to a tick.
 fn processor_time() -> f64 {
     let stat = std::fs::read_to_string("/proc/self/schedstat").unwrap_or_default();
     stat.split(' ').next().and_then(|ns| ns.parse::<f64>().ok()).unwrap_or(f64::NAN) * 1e-9

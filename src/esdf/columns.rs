@@ -85,7 +85,7 @@ impl Columns {
     }
 
     /// Lowers row k by the live rows, from the last passed to the first, and forgets those that lower it nowhere.
-    #[inline]
+    #[inline(always)]
     fn lower(&mut self, k: usize) {
         let mut best = self.best[k];
         let mut kept = self.live.len();

@@ -2,7 +2,7 @@
 //!
 //! Two ways, both exact. Where values are low everywhere, they bound how far a site can help: a window, in whole blocks of
 //! nodes. Else the lower envelope of parabolas (Felzenszwalb & Huttenlocher 2012, cited by \[SCR\] as [22]), O(nodes) whatever
-//! the values.
+//! the values; a run of equal values, as beside a wall, is one piece of it.
 
 use super::columns::Columns;
 

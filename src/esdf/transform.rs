@@ -4,7 +4,8 @@
 //! result itself and backwards in one slab of memory. What is left is a matter of each slab alone, held in the cache. Within a
 //! slab y is fastest: row k holds the nodes (k, 0..ny), padded to whole blocks of `LANES`, so that loops over rows are loops
 //! over blocks. Those loops are functions that are never inlined: only so does the compiler know that their rows do not
-//! overlap, and takes four nodes at once.
+//! overlap, and takes four nodes at once. Rows that are alike in the whole map are one up to there (`levels`); the passes along z
+//! are the first to tell them apart.
 //!
 //! With several threads each has a part of every slab, by y, for the pass forwards, which goes through all slabs; and then some
 //! of the slabs, all of each. What the pass backwards has counted where a thread's slabs begin is found out in between, as that
@@ -16,6 +17,7 @@ use std::ops::Range;
 
 use super::FAR;
 use super::kinds::Kinds;
+use super::levels::Levels;
 use super::line::{LANES, Lines, NONE};
 use crate::map::VoxelMap;
 use crate::mission::Unknown;
@@ -65,43 +67,6 @@ pub(super) fn signed_distance(map: &VoxelMap, nodes: [usize; 3], threads: usize)
     });
     each_in_a_thread(tasks.collect());
     values
-}
-
-/// Rows of nodes that are alike in every slab, and so are all that comes of them along x and y: done once. Nothing reaches as
-/// high as most maps do, and above it all is free.
-struct Levels {
-    /// The lowest row of each level.
-    rows: Vec<usize>,
-    /// The level of each row.
-    of: Vec<usize>,
-}
-
-impl Levels {
-    fn of(map: &VoxelMap) -> Self {
-        // Bit k: cells k differ from cells k - 1 somewhere. All are free below and above the grid.
-        let words = map.dims[2].div_ceil(64);
-        let mut differ = vec![0u64; words + 1];
-        for i in 0..map.dims[0] {
-            for j in 0..map.dims[1] {
-                let mut below = 0;
-                for (differ, bits) in differ.iter_mut().zip(map.column(i, j)) {
-                    *differ |= bits ^ (bits << 1 | below);
-                    below = bits >> 63;
-                }
-                differ[words] |= below;
-            }
-        }
-        let differs = |k: usize| differ[k / 64] >> (k % 64) & 1 != 0;
-        let (mut rows, mut of) = (vec![0], vec![0]);
-        for k in 1..=map.dims[2] {
-            // Node k lies between cells k - 1 and k.
-            if differs(k) || differs(k - 1) {
-                rows.push(k);
-            }
-            of.push(rows.len() - 1);
-        }
-        Self { rows, of }
-    }
 }
 
 /// Parts of slabs along y: part p holds nodes `along_y[p]`, level by level, where a slab of one part would hold them.
