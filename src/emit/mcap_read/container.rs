@@ -9,6 +9,7 @@ use super::message::MessageError;
 use super::{Attached, McapReadError, Topic};
 use crate::emit::cdr::Reader;
 use crate::emit::mcap::METADATA;
+use crate::memory;
 
 /// No record is longer than this, so that a length that lies does not take all memory.
 const LONGEST_RECORD: usize = 1 << 30;
@@ -28,6 +29,8 @@ pub struct Contents {
     schemas: BTreeMap<u16, String>,
     /// Log time and bytes of each message, in file order, by channel.
     messages: BTreeMap<u16, Messages>,
+    /// Bytes of all records so far: a chunk of a few kilobytes may unpack to gigabytes.
+    unpacked: u128,
 }
 
 impl Contents {
@@ -39,7 +42,7 @@ impl Contents {
         let mut contents = Self::default();
         let options = LinearReaderOptions::default()
             .with_emit_chunks(true)
-            .with_record_length_limit(LONGEST_RECORD)
+            .with_record_length_limit(longest_record())
             .with_validate_data_section_crc(true)
             .with_validate_summary_section_crc(true);
         each_record(bytes, options, &mut |opcode, body| match opcode {
@@ -61,7 +64,7 @@ impl Contents {
         let options = LinearReaderOptions::default()
             .with_skip_start_magic(true)
             .with_skip_end_magic(true)
-            .with_record_length_limit(LONGEST_RECORD)
+            .with_record_length_limit(longest_record())
             .with_prevalidate_chunk_crcs(true);
         each_record(&alone, options, &mut |opcode, body| self.record(opcode, body))
     }
@@ -70,6 +73,10 @@ impl Contents {
         if opcode == op::ATTACHMENT && !attachment_fits(body) {
             return Err(McapReadError::Overrun);
         }
+        // What keeps a message or a name, beside its bytes.
+        const KEPT: usize = 64;
+        self.unpacked += (body.len() + KEPT) as u128;
+        memory::fits(self.unpacked)?;
         match ::mcap::parse_record(opcode, body)? {
             Record::Channel(channel) => {
                 self.channels.insert(channel.id, (channel.topic, channel.schema_id));
@@ -130,6 +137,10 @@ impl Contents {
         };
         messages.iter().enumerate().map(|(row, (_, bytes))| decode_one(bytes).map_err(|e| placed(row, e))).collect()
     }
+}
+
+fn longest_record() -> usize {
+    usize::try_from(memory::cap()).unwrap_or(LONGEST_RECORD).min(LONGEST_RECORD)
 }
 
 /// Takes a record's opcode and body.
