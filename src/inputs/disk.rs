@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use super::tidy;
-use crate::memory;
 use crate::diag::{Diagnostic, Diagnostics, Span};
+use crate::memory;
 use crate::pipeline::TextFile;
 use crate::robot::Files;
 

@@ -3,8 +3,8 @@
 use std::ops::Deref;
 use std::sync::{Arc, OnceLock};
 
-use crate::esdf::{self, Esdf};
 use crate::diag::Diagnostic;
+use crate::esdf::{self, Esdf};
 use crate::map::VoxelMap;
 use crate::memory;
 
@@ -28,7 +28,10 @@ impl Place {
         memory::fits(nodes * size_of::<f32>() as u128 + cells / 8).map_err(|fault| {
             let [x, y, z] = map.dims;
             let message = format!("the distance field of the map's {x} x {y} x {z} cells would take {fault}");
-            let hint = format!("larger cells (resolution_m) take less, and so does a map cut to what is driven on; or {}", memory::HINT);
+            let hint = format!(
+                "larger cells (resolution_m) take less, and so does a map cut to what is driven on; or {}",
+                memory::HINT
+            );
             Diagnostic::error("map/too-large", message).hint(hint)
         })
     }

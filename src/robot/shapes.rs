@@ -192,7 +192,8 @@ mod tests {
         ] {
             assert_eq!(leaves(Path::new(name), Path::new("/r/own"), levels), out, "{name} from {levels}");
         }
-        for (urdf, down) in [("a.urdf", 0), ("./urdf/a.urdf", 1), ("x/y/a.urdf", 2), ("../a.urdf", 0), ("/a/b.urdf", 0)] {
+        for (urdf, down) in [("a.urdf", 0), ("./urdf/a.urdf", 1), ("x/y/a.urdf", 2), ("../a.urdf", 0), ("/a/b.urdf", 0)]
+        {
             assert_eq!(levels(Path::new(urdf)), down, "{urdf}");
         }
     }
