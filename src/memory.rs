@@ -91,7 +91,7 @@ pub fn parse(text: &str) -> Option<u64> {
     let power = ["", "k", "m", "g", "t"].iter().position(|known| *known == unit)?;
     let bytes = number * f64::powi(thousand, power as i32);
     // Less than a mebibyte holds no mission.
-    (bytes >= 1_048_576.0 && bytes < 1e18).then_some(bytes as u64)
+    (1_048_576.0..1e18).contains(&bytes).then_some(bytes as u64)
 }
 
 #[cfg(test)]

@@ -31,10 +31,10 @@ impl Columns {
             // The lowest row that lies above the one below it somewhere, and the highest that lies below it.
             let (mut rise, mut fall) = (nz, 0);
             self.before[0] = block(levels, level_of[0] * self.stride + at);
-            for k in 1..nz {
+            for (k, level) in level_of.iter().enumerate().skip(1) {
                 self.before[k] = self.before[k - 1];
                 if differs(k) {
-                    self.before[k] = block(levels, level_of[k] * self.stride + at);
+                    self.before[k] = block(levels, level * self.stride + at);
                     let (below, here) = (&self.before[k - 1], &self.before[k]);
                     if rise == nz && any_below(below, here) {
                         rise = k;

@@ -3,7 +3,7 @@
 use std::ops::Deref;
 use std::sync::{Arc, OnceLock};
 
-use crate::diag::Diagnostic;
+use crate::diag::{Diagnostic, Diagnostics};
 use crate::esdf::{self, Esdf};
 use crate::map::VoxelMap;
 use crate::memory;
@@ -21,7 +21,7 @@ impl Place {
     ///
     /// # Errors
     /// It and the map would take more than may be used: `map/too-large`.
-    pub fn has_room(&self) -> Result<(), Diagnostic> {
+    pub fn has_room(&self) -> Result<(), Diagnostics> {
         let map = &self.0.0;
         let cells = map.dims.iter().map(|n| *n as u128).product::<u128>();
         let nodes = map.dims.iter().map(|n| *n as u128 + 1).product::<u128>();
@@ -32,7 +32,7 @@ impl Place {
                 "larger cells (resolution_m) take less, and so does a map cut to what is driven on; or {}",
                 memory::HINT
             );
-            Diagnostic::error("map/too-large", message).hint(hint)
+            Diagnostic::error("map/too-large", message).hint(hint).into()
         })
     }
 

@@ -71,7 +71,8 @@ fn find(
     at: &Span,
 ) -> Result<(PathBuf, Vec<u8>), Box<Diagnostic>> {
     let folder = Path::new(urdf_path).parent().unwrap_or(Path::new(""));
-    let mut levels = levels;
+    // A URDF alone in a ROS package: what belongs to it lies beside its folder.
+    let mut levels = levels.max(usize::from(folder.file_name().is_some_and(|name| name == "urdf")));
     let candidates: Vec<PathBuf> = if let Some(in_package) = name.strip_prefix("package://") {
         let without_package = in_package.split_once('/').map(|(_, rest)| rest);
         let names = [Some(in_package), without_package];
