@@ -105,7 +105,7 @@ pub fn las() -> Vec<Vec<u8>> {
 
 pub fn octomap() -> Vec<Vec<u8>> {
     // Fifteen times the first child, then eight leaves: three occupied, five free.
-    let bits: Vec<u8> = [vec![3, 0].repeat(15), vec![0b01_10_10_01, 0b01_01_10_01]].concat();
+    let bits: Vec<u8> = [[3, 0].repeat(15), vec![0b01_10_10_01, 0b01_01_10_01]].concat();
     let header = |kind: &str, id: &str, size: usize| {
         format!("# Octomap OcTree{kind} file\nid {id}\nsize {size}\nres 0.1\ndata\n")
     };
