@@ -20,7 +20,7 @@
 //! | [`emit`] | bytes | `CommandTable`, `Report` |
 //! | [`play`] | commands in real time | `CommandTable`, `RobotModel` |
 //!
-//! Above all stages are [`math`], [`geom`] and [`diag`]; below them [`pipeline`], [`inputs`] (reads missions and command files with
+//! Above all stages are [`memory`], [`math`], [`geom`] and [`diag`]; below them [`pipeline`], [`inputs`] (reads missions and command files with
 //! all that they name), [`eval`] (suites of scenes) and [`cli`]. Only `inputs` and `cli` open files: stages take text and bytes, so
 //! a mission can be compiled from memory.
 //!
@@ -119,6 +119,7 @@ pub mod geom;
 pub mod inputs;
 pub mod map;
 pub mod math;
+pub mod memory;
 pub mod mission;
 pub mod optimize;
 pub mod pipeline;

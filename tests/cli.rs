@@ -13,6 +13,8 @@ mod bad_maps_and_robots;
 mod check;
 #[path = "cli/compile.rs"]
 mod compile;
+#[path = "cli/hazards.rs"]
+mod hazards;
 #[path = "cli/inspect.rs"]
 mod inspect;
 #[path = "cli/robot.rs"]

@@ -16,10 +16,13 @@ pub mod robot;
 pub mod schema;
 pub mod terminal;
 
+use std::path::PathBuf;
+
 use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::diag::{Diagnostics, Severity};
 use crate::inputs;
+use crate::memory;
 use terminal::Terminal;
 
 /// Offline trajectory compiler for differential-drive robots that change shape.
@@ -35,6 +38,12 @@ struct Args {
     /// Show no progress; results and diagnostics are printed all the same.
     #[arg(long, short, global = true)]
     quiet: bool,
+    /// Most memory that one input may take: a file, a map's grid, its distance field [default: half of the machine's].
+    #[arg(long, global = true, value_name = "SIZE", value_parser = size)]
+    max_memory: Option<u64>,
+    /// Let robots name meshes under this folder too; else only those under their own. May be repeated.
+    #[arg(long, global = true, value_name = "DIR")]
+    allow_path: Vec<PathBuf>,
     #[command(subcommand)]
     command: Command,
 }
@@ -66,6 +75,12 @@ pub fn main() -> u8 {
             return u8::try_from(error.exit_code()).unwrap_or(2);
         }
     };
+    match (args.max_memory, inputs::machine::memory()) {
+        (Some(bytes), _) => memory::set(bytes, memory::Source::Asked),
+        (None, Some(bytes)) => memory::set(bytes / 2, memory::Source::Machine),
+        (None, None) => {}
+    }
+    inputs::allow(&args.allow_path);
     let mut terminal = Terminal::new();
     terminal.quiet = args.quiet;
     let result = match &args.command {
@@ -90,6 +105,10 @@ pub fn main() -> u8 {
             exit_code(&diagnostics)
         }
     }
+}
+
+fn size(text: &str) -> Result<u64, &'static str> {
+    memory::parse(text).ok_or("a size of at least 1 MiB, such as 512MiB or 8GB")
 }
 
 fn exit_code(diagnostics: &Diagnostics) -> u8 {

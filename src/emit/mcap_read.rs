@@ -14,6 +14,7 @@ use super::mcap::{METADATA, topic};
 use crate::command::{CommandRow, CommandTable};
 use crate::diag::{Describe, Diagnostic, Diagnostics};
 use crate::geom::{Pose2, unwrap_near};
+use crate::memory;
 use crate::report::names;
 use container::Contents;
 use message::{MessageError, joint_names, joint_state, pose, skip_header, twist, wheel_speeds};
@@ -80,6 +81,9 @@ pub enum McapReadError {
     /// A record whose lengths contradict each other.
     #[error("the MCAP file is damaged: a record is longer than what holds it")]
     Overrun,
+    /// It holds more than its length says.
+    #[error("what the MCAP file holds would take {0}")]
+    Memory(#[from] memory::TooMuch),
     /// Compressed in another way.
     #[error("chunk compression `{0}` is not read here")]
     Compression(String),
@@ -151,6 +155,7 @@ impl Describe for McapReadError {
             Self::Damaged(_) | Self::Overrun => {
                 Diagnostic::error("commands/damaged", self).hint("copy or compile it again")
             }
+            Self::Memory(_) => Diagnostic::error("commands/too-large", self).hint(memory::HINT),
             Self::Compression(_) => Diagnostic::error("commands/compression", self).hint("use zstd or none"),
             Self::Foreign => {
                 Diagnostic::error("commands/foreign", self).hint("commands.mcap is written by `trajc compile`")

@@ -23,43 +23,69 @@ impl Columns {
         Self { stride, before: rows.clone(), best: rows, live: Vec::with_capacity(nz) }
     }
 
-    /// `repeats`: whether a row equals the row below.
-    pub(super) fn transform(&mut self, slab: &mut [f32], repeats: &[bool]) {
+    /// From rows that each stand for one or more of the slab (`level_of`) to the slab; `repeats`: whether such a row equals the one before.
+    pub(super) fn transform(&mut self, levels: &[f32], level_of: &[usize], repeats: &[bool], slab: &mut [f32]) {
         let nz = self.before.len();
+        let differs = |k: usize| level_of[k] != level_of[k - 1] && !repeats[level_of[k]];
         for at in (0..self.stride).step_by(LANES) {
-            for (k, row) in self.before.iter_mut().enumerate() {
-                *row = block(slab, k * self.stride + at);
+            // The lowest row that lies above the one below it somewhere, and the highest that lies below it.
+            let (mut rise, mut fall) = (nz, 0);
+            self.before[0] = block(levels, level_of[0] * self.stride + at);
+            for (k, level) in level_of.iter().enumerate().skip(1) {
+                self.before[k] = self.before[k - 1];
+                if differs(k) {
+                    self.before[k] = block(levels, level * self.stride + at);
+                    let (below, here) = (&self.before[k - 1], &self.before[k]);
+                    if rise == nz && any_below(below, here) {
+                        rise = k;
+                    }
+                    if any_below(here, below) {
+                        fall = k;
+                    }
+                }
             }
+            // Up to the first rise no lower row is nearer, nor can any pass by the last row of these.
+            self.best[..rise].copy_from_slice(&self.before[..rise]);
             self.live.clear();
-            for (k, repeats) in repeats.iter().enumerate() {
-                if *repeats && self.live.last() == Some(&(k - 1)) {
+            self.keep(rise - 1);
+            for k in rise..nz {
+                if !differs(k) && self.live.last() == Some(&(k - 1)) {
                     self.live.pop();
                 }
-                let own = self.before[k];
-                self.best[k] = own;
+                self.best[k] = self.before[k];
                 self.lower(k);
-                if any_below(&own, &[NONE; LANES]) {
-                    self.live.push(k);
-                }
+                self.keep(k);
             }
+            // From the last fall on, likewise.
             self.live.clear();
-            for k in (0..nz).rev() {
-                if repeats.get(k + 1) == Some(&true) && self.live.last() == Some(&(k + 1)) {
+            self.keep(fall);
+            for k in (0..fall).rev() {
+                if !differs(k + 1) && self.live.last() == Some(&(k + 1)) {
                     self.live.pop();
                 }
                 // Beaten by a row below: so it is further down.
                 let beaten = !(0..LANES).any(|lane| self.before[k][lane] <= self.best[k][lane]);
                 self.lower(k);
-                if !beaten && any_below(&self.before[k], &[NONE; LANES]) {
-                    self.live.push(k);
+                if !beaten {
+                    self.keep(k);
                 }
-                slab[k * self.stride + at..][..LANES].copy_from_slice(&self.best[k]);
+            }
+            for (row, best) in slab.chunks_exact_mut(self.stride).zip(&self.best) {
+                row[at..at + LANES].copy_from_slice(best);
             }
         }
     }
 
-    /// Lowers row k by the live rows, from the last passed to the first, and forgets those that lower it nowhere.
+    /// Row k may still be the nearest, if it has any sites.
     #[inline]
+    fn keep(&mut self, k: usize) {
+        if any_below(&self.before[k], &[NONE; LANES]) {
+            self.live.push(k);
+        }
+    }
+
+    /// Lowers row k by the live rows, from the last passed to the first, and forgets those that lower it nowhere.
+    #[inline(always)]
     fn lower(&mut self, k: usize) {
         let mut best = self.best[k];
         let mut kept = self.live.len();

@@ -2,7 +2,7 @@
 //!
 //! Two ways, both exact. Where values are low everywhere, they bound how far a site can help: a window, in whole blocks of
 //! nodes. Else the lower envelope of parabolas (Felzenszwalb & Huttenlocher 2012, cited by \[SCR\] as [22]), O(nodes) whatever
-//! the values.
+//! the values; a run of equal values, as beside a wall, is one piece of it.
 
 use super::columns::Columns;
 
@@ -19,14 +19,14 @@ const LOW_RISE: usize = 32;
 
 pub(super) type Block = [f32; LANES];
 
-/// A parabola on the lower envelope.
+/// A run of equal values as a piece of the lower envelope: level between its ends, a parabola beyond each. Two such pieces cross once,
+/// as parabolas do: the right one less the left one never grows.
 #[derive(Clone, Copy, Default)]
-struct Parabola {
-    /// Its lowest point is (`at`, `height`).
-    at: f32,
+struct Piece {
+    /// Ends of the run; both counted from 1, so that all abscissae are positive and cutting is rounding down.
+    first: f32,
+    last: f32,
     height: f32,
-    /// `height + at^2`.
-    key: f64,
     /// It rules beyond this abscissa.
     from: f64,
 }
@@ -35,7 +35,7 @@ struct Parabola {
 pub(super) struct Lines {
     size: [usize; 2],
     stride: usize,
-    parabolas: Vec<Parabola>,
+    pieces: Vec<Piece>,
     /// 1 / (2 d).
     halves: Vec<f64>,
     /// A line as it was, with `PAD` of nothing before it and behind it.
@@ -43,35 +43,42 @@ pub(super) struct Lines {
     /// Lowest value of each column.
     low: Vec<f32>,
     slab: Vec<f32>,
-    /// Whether a row equals the row below.
+    level_of: Vec<usize>,
+    /// Whether a row given equals the one before.
     repeats: Vec<bool>,
     high: Columns,
 }
 
 impl Lines {
-    /// For slabs of nz rows of ny nodes, the rows padded to whole blocks.
-    pub(super) fn new([ny, nz]: [usize; 2]) -> Self {
+    /// For slabs of rows of ny nodes, padded to whole blocks; `level_of`: which of the rows given is each row of the slab.
+    pub(super) fn new(ny: usize, level_of: &[usize]) -> Self {
+        let nz = level_of.len();
         let stride = ny.next_multiple_of(LANES);
         let longest = ny.max(nz);
         Self {
             size: [ny, nz],
             stride,
-            parabolas: vec![Parabola::default(); longest + 1],
+            pieces: vec![Piece::default(); longest + 1],
             halves: (0..longest + 1).map(|d| 0.5 / d as f64).collect(),
             line: vec![f32::MAX; longest.next_multiple_of(LANES) + 2 * PAD],
             low: vec![0.0; stride],
             slab: vec![0.0; stride * nz],
+            level_of: level_of.to_vec(),
             repeats: vec![false; nz],
             high: Columns::new(stride, if nz > LOW_RISE { nz } else { 0 }),
         }
     }
 
-    /// Transforms along rows, then along columns.
-    pub(super) fn transform(&mut self, slab: &mut [f32]) {
+    pub(super) fn level_of(&self) -> &[usize] {
+        &self.level_of
+    }
+
+    /// Transforms the rows given, each standing for one row or more of the slab; then the slab along its columns.
+    pub(super) fn transform(&mut self, levels: &mut [f32], slab: &mut [f32]) {
         let [ny, nz] = self.size;
         // Solids are upright as a rule, so a row often equals the row below.
-        for k in 0..nz {
-            let (below, row) = slab.split_at_mut(k * self.stride);
+        for k in 0..levels.len() / self.stride {
+            let (below, row) = levels.split_at_mut(k * self.stride);
             let row = &mut row[..ny];
             self.repeats[k] = k > 0 && equal(row, &self.line[PAD..PAD + ny]);
             if self.repeats[k] {
@@ -85,11 +92,14 @@ impl Lines {
                 self.envelope(row);
             }
         }
-        if nz <= LOW_RISE {
-            self.columns(slab);
-        } else {
-            self.high.transform(slab, &self.repeats);
+        if nz > LOW_RISE {
+            self.high.transform(levels, &self.level_of, &self.repeats, slab);
+            return;
         }
+        for (row, level) in slab.chunks_exact_mut(self.stride).zip(&self.level_of) {
+            row.copy_from_slice(&levels[level * self.stride..][..self.stride]);
+        }
+        self.columns(slab);
     }
 
     /// The row whose copy is in `line`.
@@ -122,37 +132,61 @@ impl Lines {
     fn run(&mut self, line: &mut [f32]) {
         let nodes = line.len();
         let mut top = 0;
-        // Abscissae count from 1, so that all are positive and cutting is rounding down.
-        for (m, height) in line.iter().enumerate() {
-            if *height >= NONE {
+        let mut next = 0;
+        while next < nodes {
+            let (start, height) = (next, line[next]);
+            next += 1;
+            while next < nodes && line[next] == height {
+                next += 1;
+            }
+            if height >= NONE {
                 continue;
             }
-            let at = (m + 1) as f32;
-            let key = f64::from(*height) + f64::from(at) * f64::from(at);
-            let mut from = 0.0;
+            let mut piece = Piece { first: (start + 1) as f32, last: next as f32, height, from: 0.0 };
             while top > 0 {
-                let rival = &self.parabolas[top - 1];
-                from = (key - rival.key) * self.halves[(at - rival.at) as usize];
-                if from > rival.from {
+                let rival = &self.pieces[top - 1];
+                piece.from = self.crossing(rival, &piece);
+                if piece.from > rival.from {
                     break;
                 }
                 top -= 1;
-                from = 0.0;
+                piece.from = 0.0;
             }
-            if from < nodes as f64 {
-                self.parabolas[top] = Parabola { at, height: *height, key, from };
+            if piece.from < nodes as f64 {
+                self.pieces[top] = piece;
                 top += 1;
             }
         }
         let mut end = nodes;
-        for parabola in self.parabolas[..top].iter().rev() {
-            let from = parabola.from as usize;
-            for (k, value) in line[from..end].iter_mut().enumerate() {
-                let d = (from + k + 1) as f32 - parabola.at;
-                *value = parabola.height + d * d;
-            }
+        for piece in self.pieces[..top].iter().rev() {
+            let from = piece.from as usize;
+            let (first, last) = ((piece.first as usize - 1).clamp(from, end), (piece.last as usize).clamp(from, end));
+            parabola(&mut line[from..first], (from + 1) as f32 - piece.first, piece.height);
+            line[first..last].fill(piece.height);
+            parabola(&mut line[last..end], (last + 1) as f32 - piece.last, piece.height);
             end = from;
         }
+    }
+
+    /// The left one is the lower up to here.
+    #[inline]
+    fn crossing(&self, left: &Piece, right: &Piece) -> f64 {
+        // Of the parabola of one end with that of another; `rise` is the right height less the left one.
+        let between = |left: f32, right: f32, rise: f64| {
+            0.5 * (f64::from(left) + f64::from(right)) + rise * self.halves[(right - left) as usize]
+        };
+        let rise = f64::from(right.height) - f64::from(left.height);
+        let at = between(left.last, right.first, rise);
+        if at > f64::from(right.first) {
+            // In the right run or beyond it.
+            let at = f64::from(left.last) + rise.sqrt();
+            return if at <= f64::from(right.last) { at } else { between(left.last, right.last, rise) };
+        }
+        if at < f64::from(left.last) {
+            let at = f64::from(right.first) - (-rise).sqrt();
+            return if at >= f64::from(left.first) { at } else { between(left.first, right.first, rise) };
+        }
+        at
     }
 
     /// A column's value gains at most what it differs from the column's lowest: no site further than the root of that helps.
@@ -188,6 +222,15 @@ impl Lines {
                 out.copy_from_slice(&best);
             }
         }
+    }
+}
+
+/// `height + d^2`, d from `first` on.
+#[inline]
+fn parabola(line: &mut [f32], first: f32, height: f32) {
+    for (k, value) in line.iter_mut().enumerate() {
+        let d = first + k as i32 as f32;
+        *value = height + d * d;
     }
 }
 

@@ -7,6 +7,7 @@
 mod columns;
 mod interpolate;
 mod kinds;
+mod levels;
 mod line;
 #[cfg(test)]
 mod reference;
@@ -207,6 +208,14 @@ mod tests {
                 assert_like_reference([9, 20, nz], seed as u64, 4, 3, outside);
                 assert_like_reference([5, 17, nz], seed as u64, 40, 0, outside);
             }
+        }
+    }
+
+    #[test]
+    fn wide_halls_with_few_and_with_many_boxes_equal_the_plain_transform() {
+        for (seed, boxes) in [1, 3, 9, 27].into_iter().enumerate() {
+            assert_like_reference([40, 300, 12], seed as u64, boxes, 2, Unknown::Free);
+            assert_like_reference([300, 40, 70], seed as u64, boxes, 0, Unknown::Occupied);
         }
     }
 

@@ -4,7 +4,8 @@
 //! result itself and backwards in one slab of memory. What is left is a matter of each slab alone, held in the cache. Within a
 //! slab y is fastest: row k holds the nodes (k, 0..ny), padded to whole blocks of `LANES`, so that loops over rows are loops
 //! over blocks. Those loops are functions that are never inlined: only so does the compiler know that their rows do not
-//! overlap, and takes four nodes at once.
+//! overlap, and takes four nodes at once. Rows that are alike in the whole map are one up to there (`levels`); the passes along z
+//! are the first to tell them apart.
 //!
 //! With several threads each has a part of every slab, by y, for the pass forwards, which goes through all slabs; and then some
 //! of the slabs, all of each. What the pass backwards has counted where a thread's slabs begin is found out in between, as that
@@ -16,6 +17,7 @@ use std::ops::Range;
 
 use super::FAR;
 use super::kinds::Kinds;
+use super::levels::Levels;
 use super::line::{LANES, Lines, NONE};
 use crate::map::VoxelMap;
 use crate::mission::Unknown;
@@ -23,30 +25,34 @@ use crate::mission::Unknown;
 /// Steps of a node with no site on its line; one more is lost in rounding. (2^24; its square is above `NONE`.)
 const NEVER: f32 = 16_777_216.0;
 
+/// Nodes along y and rows that are turned to the layout of the field together.
+const TILE: usize = 4;
+type Tile = [f32; TILE];
+
 /// Signed distances (m) at all nodes, by so many threads (at least 1).
 pub(super) fn signed_distance(map: &VoxelMap, nodes: [usize; 3], threads: usize) -> Vec<f32> {
     let [nx, ny, nz] = nodes;
     let size = ny * nz;
     let mut values = vec![0.0f32; nx * size];
-    let parts = Parts::new(ny, nz, threads);
+    let levels = Levels::of(map);
+    let parts = Parts::new(ny, levels.rows.len(), threads);
+    let known = ny * levels.rows.len();
     let shares = shares(nx, threads, 1);
-    let forwards = sweep_forwards(map, &parts, &shares, &mut values);
+    let forwards = sweep_forwards(map, &levels, &parts, &shares, &mut values);
     let solids: Vec<bool> = (0..nx).map(|i| forwards.iter().any(|part| part.solids[i])).collect();
     // The slabs of each share, from the last one on, and what the pass backwards brings into it.
     let work = |share: &Range<usize>, slabs: &mut [f32], after: Option<Vec<f32>>| {
-        let mut inner = Slabs::new(map, parts.clone());
+        let mut inner = Slabs::new(map, &levels, parts.clone());
         let mut after =
-            after.unwrap_or_else(|| slabs[slabs.len() - size..].iter().map(|steps| steps * NEVER).collect());
+            after.unwrap_or_else(|| slabs[slabs.len() - size..][..known].iter().map(|steps| steps * NEVER).collect());
         for (i, slab) in share.clone().zip(slabs.chunks_exact_mut(size)).rev() {
             if i + 1 < nx {
-                step_back(slab, &mut after);
+                step_back(&slab[..known], &mut after);
             }
             let edge = if map.outside == Unknown::Occupied { i.min(nx - 1 - i) as f32 } else { f32::INFINITY };
-            inner.outside(slab, &after, edge);
-            if solids[i] {
-                inner.inside(slab, &after);
-            }
-            inner.write(slab);
+            inner.outside(&slab[..known], &after);
+            let depths = if solids[i] { inner.inside(&slab[..known], &after) } else { 0..0 };
+            inner.write(slab, edge, depths);
         }
     };
     let after = |share: usize| {
@@ -63,21 +69,21 @@ pub(super) fn signed_distance(map: &VoxelMap, nodes: [usize; 3], threads: usize)
     values
 }
 
-/// Parts of slabs along y: part p holds nodes `along_y[p]`, row by row, where a slab of one part would hold them.
+/// Parts of slabs along y: part p holds nodes `along_y[p]`, level by level, where a slab of one part would hold them.
 #[derive(Clone)]
 struct Parts {
     along_y: Vec<Range<usize>>,
-    nz: usize,
+    levels: usize,
 }
 
 impl Parts {
-    fn new(ny: usize, nz: usize, threads: usize) -> Self {
-        Self { along_y: shares(ny, threads, LANES), nz }
+    fn new(ny: usize, levels: usize, threads: usize) -> Self {
+        Self { along_y: shares(ny, threads, LANES), levels }
     }
 
     /// Where in a slab part p lies.
     fn range(&self, p: usize) -> Range<usize> {
-        self.along_y[p].start * self.nz..self.along_y[p].end * self.nz
+        self.along_y[p].start * self.levels..self.along_y[p].end * self.levels
     }
 }
 
@@ -97,8 +103,15 @@ struct Forwards {
 }
 
 /// Steps forwards, into `values`.
-fn sweep_forwards(map: &VoxelMap, parts: &Parts, shares: &[Range<usize>], values: &mut [f32]) -> Vec<Forwards> {
-    let size = parts.range(parts.along_y.len() - 1).end;
+fn sweep_forwards(
+    map: &VoxelMap,
+    levels: &Levels,
+    parts: &Parts,
+    shares: &[Range<usize>],
+    values: &mut [f32],
+) -> Vec<Forwards> {
+    let nz = map.dims[2] + 1;
+    let size = (map.dims[1] + 1) * nz;
     let mut columns: Vec<Vec<&mut [f32]>> =
         parts.along_y.iter().map(|_| Vec::with_capacity(values.len() / size)).collect();
     for slab in values.chunks_exact_mut(size) {
@@ -110,15 +123,15 @@ fn sweep_forwards(map: &VoxelMap, parts: &Parts, shares: &[Range<usize>], values
         }
     }
     let sweep = |p: usize, mut slabs: Vec<&mut [f32]>| {
-        let (along_y, nz) = (parts.along_y[p].clone(), parts.nz);
+        let along_y = parts.along_y[p].clone();
         let (ny, mut kinds) = (along_y.len(), Kinds::new(along_y, nz));
         let mut solids = vec![false; slabs.len()];
         for (i, solid) in solids.iter_mut().enumerate() {
             *solid = kinds.read(map, i);
             let (done, slab) = slabs.split_at_mut(i);
-            for k in 0..nz {
-                let row = k * ny..(k + 1) * ny;
-                step(&mut slab[0][row.clone()], kinds.row(k), done.last().map(|before| &before[row]));
+            for (level, k) in levels.rows.iter().enumerate() {
+                let row = level * ny..(level + 1) * ny;
+                step(&mut slab[0][row.clone()], kinds.row(*k), done.last().map(|before| &before[row]));
             }
         }
         let mut after = vec![Vec::new(); shares.len() - 1];
@@ -186,8 +199,10 @@ struct Slabs {
     size: [usize; 2],
     stride: usize,
     resolution: f32,
+    /// Squared distances of the levels, then of all rows.
+    along_x: Vec<f32>,
     squares: Vec<f32>,
-    metres: Vec<f32>,
+    depths: Vec<f32>,
     /// Distance to the grid's edges along y, cells.
     edges: Vec<f32>,
     /// Distance to the grid's edges in this slab, m.
@@ -195,62 +210,83 @@ struct Slabs {
 }
 
 impl Slabs {
-    fn new(map: &VoxelMap, parts: Parts) -> Self {
-        let (ny, nz) = (map.dims[1] + 1, parts.nz);
+    fn new(map: &VoxelMap, levels: &Levels, parts: Parts) -> Self {
+        let [ny, nz] = [map.dims[1] + 1, map.dims[2] + 1];
         let stride = ny.next_multiple_of(LANES);
         // Infinite where the edge is no wall.
         let walled = map.outside == Unknown::Occupied;
         let edge = |j: usize| if walled { j.min(ny - 1 - j) as f32 } else { f32::INFINITY };
-        let edges: Vec<f32> = (0..ny).map(edge).collect();
+        let edges: Vec<f32> = (0..stride).map(|j| edge(j.min(ny - 1))).collect();
         let squares = vec![0.0; stride * nz];
-        let metres = squares.clone();
         Self {
-            lines: Lines::new([ny, nz]),
+            lines: Lines::new(ny, &levels.of),
             parts,
             size: [ny, nz],
             stride,
             resolution: map.resolution as f32,
+            along_x: vec![0.0; stride * levels.rows.len()],
+            depths: squares.clone(),
             squares,
-            metres,
             bounds: edges.clone(),
             edges,
         }
     }
 
-    /// Distance to the nearest site and, where `edge` is finite, to the grid's edge; `edge` is that along x, cells.
-    fn outside(&mut self, forwards: &[f32], after: &[f32], edge: f32) {
-        self.squares(forwards, after, 1.0);
-        self.lines.transform(&mut self.squares);
-        for (bound, along) in self.bounds.iter_mut().zip(&self.edges) {
-            *bound = if *along < edge { *along } else { edge } * self.resolution;
-        }
-        let rows = self.metres.chunks_exact_mut(self.stride).zip(self.squares.chunks_exact(self.stride));
-        rows.for_each(|(metres, squares)| to_metres(metres, squares, &self.bounds, self.resolution));
+    /// Squared distance to the nearest site.
+    fn outside(&mut self, forwards: &[f32], after: &[f32]) {
+        self.along_x(forwards, after, 1.0);
+        self.lines.transform(&mut self.along_x, &mut self.squares);
     }
 
-    /// Subtracts the depth of the nodes inside: the distance to the nearest node that is not.
-    fn inside(&mut self, forwards: &[f32], after: &[f32]) {
-        self.squares(forwards, after, -1.0);
-        self.lines.transform(&mut self.squares);
-        subtract_depth(&mut self.metres, &self.squares, self.resolution);
+    /// Squared depth of the nodes inside: to the nearest node that is not. All of them are in these rows.
+    fn inside(&mut self, forwards: &[f32], after: &[f32]) -> Range<usize> {
+        self.along_x(forwards, after, -1.0);
+        let mut levels = self.along_x.chunks_exact(self.stride).map(any_above_zero);
+        let first = levels.position(|deep| deep).unwrap_or(0);
+        let last = levels.rposition(|deep| deep).map_or(first, |more| first + 1 + more);
+        self.lines.transform(&mut self.along_x, &mut self.depths);
+        let levels = self.lines.level_of();
+        levels.partition_point(|level| *level < first)..levels.partition_point(|level| *level <= last)
     }
 
     /// Squared distance along x for the nodes whose steps have this sign, 0 for all others.
-    fn squares(&mut self, forwards: &[f32], after: &[f32], sign: f32) {
+    fn along_x(&mut self, forwards: &[f32], after: &[f32], sign: f32) {
         for (p, along_y) in self.parts.along_y.iter().enumerate() {
             let (part, length) = (self.parts.range(p), along_y.len());
             let steps = forwards[part.clone()].chunks_exact(length).zip(after[part].chunks_exact(length));
-            for (row, (forwards, after)) in self.squares.chunks_exact_mut(self.stride).zip(steps) {
+            for (row, (forwards, after)) in self.along_x.chunks_exact_mut(self.stride).zip(steps) {
                 nearest(&mut row[along_y.clone()], forwards, after, sign);
             }
         }
     }
 
-    /// To the layout of the field: z fastest.
-    fn write(&self, slab: &mut [f32]) {
-        for (j, column) in slab.chunks_exact_mut(self.size[1]).enumerate() {
-            for (value, metres) in column.iter_mut().zip(self.metres[j..].iter().step_by(self.stride)) {
-                *value = *metres;
+    /// Metres, in the layout of the field: z fastest. `edge`: distance to the grid's edge along x, cells, or infinite.
+    fn write(&mut self, slab: &mut [f32], edge: f32, depths: Range<usize>) {
+        let [ny, nz] = self.size;
+        for (bound, along) in self.bounds.iter_mut().zip(&self.edges) {
+            *bound = if *along < edge { *along } else { edge } * self.resolution;
+        }
+        for (k, row) in self.squares.chunks_exact_mut(self.stride).enumerate() {
+            to_metres(row, &self.bounds, self.resolution);
+            if depths.contains(&k) {
+                subtract_depth(row, &self.depths[k * self.stride..][..self.stride], self.resolution);
+            }
+        }
+        let metres = |k: usize, at: usize| -> Tile {
+            self.squares[k * self.stride + at..][..TILE].try_into().expect("as long as a tile")
+        };
+        for (columns, at) in slab.chunks_mut(TILE * nz).zip((0..).step_by(TILE)) {
+            let whole = if at + TILE <= ny { nz / TILE * TILE } else { 0 };
+            for k in (0..whole).step_by(TILE) {
+                let [a, b, c, d] = [metres(k, at), metres(k + 1, at), metres(k + 2, at), metres(k + 3, at)];
+                columns[k..][..TILE].copy_from_slice(&[a[0], b[0], c[0], d[0]]);
+                columns[nz + k..][..TILE].copy_from_slice(&[a[1], b[1], c[1], d[1]]);
+                columns[2 * nz + k..][..TILE].copy_from_slice(&[a[2], b[2], c[2], d[2]]);
+                columns[3 * nz + k..][..TILE].copy_from_slice(&[a[3], b[3], c[3], d[3]]);
+            }
+            for k in whole..nz {
+                let metres = metres(k, at);
+                columns.chunks_exact_mut(nz).zip(metres).for_each(|(column, metres)| column[k] = metres);
             }
         }
     }
@@ -267,10 +303,10 @@ fn nearest(squares: &mut [f32], forwards: &[f32], after: &[f32], sign: f32) {
 }
 
 #[inline(never)]
-fn to_metres(metres: &mut [f32], squares: &[f32], bounds: &[f32], resolution: f32) {
-    for ((metres, square), bound) in metres.iter_mut().zip(squares).zip(bounds) {
-        let distance = if *square >= NONE { FAR } else { square.sqrt() * resolution };
-        *metres = if distance < *bound { distance } else { *bound };
+fn to_metres(squares: &mut [f32], bounds: &[f32], resolution: f32) {
+    for (value, bound) in squares.iter_mut().zip(bounds) {
+        let distance = if *value >= NONE { FAR } else { value.sqrt() * resolution };
+        *value = if distance < *bound { distance } else { *bound };
     }
 }
 
@@ -279,4 +315,10 @@ fn subtract_depth(metres: &mut [f32], squares: &[f32], resolution: f32) {
     for (metres, square) in metres.iter_mut().zip(squares) {
         *metres -= if *square >= NONE { FAR } else { square.sqrt() * resolution };
     }
+}
+
+/// Whether a square is not 0; without an early end, so that it runs in blocks.
+#[inline(never)]
+fn any_above_zero(squares: &[f32]) -> bool {
+    squares.iter().fold(0, |any, square| any | square.to_bits()) != 0
 }

@@ -8,6 +8,7 @@ use std::rc::Rc;
 
 use super::tidy;
 use crate::diag::{Diagnostic, Diagnostics, Span};
+use crate::memory;
 use crate::pipeline::TextFile;
 use crate::robot::Files;
 
@@ -94,9 +95,7 @@ impl Disk {
     }
 
     fn on_disk(&self, path: &Path) -> io::Result<Vec<u8>> {
-        if path.is_dir() {
-            return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a folder"));
-        }
+        regular(path)?;
         let Some(reader) = &self.reader else { return Ok(self.remember(path, std::fs::read(path)?)) };
         let (bytes, hash) = reader(path)?;
         self.know(path, hash);
@@ -142,6 +141,11 @@ impl Disk {
 }
 
 impl Files for Disk {
+    fn may_leave(&self, path: &Path) -> bool {
+        // What is attached is not on the disk.
+        self.attached.is_some() || super::allowed(path)
+    }
+
     fn read(&mut self, path: &Path) -> io::Result<Vec<u8>> {
         let bytes = self.bytes(path).inspect_err(|error| {
             // Were it there, it would be read instead of a later candidate.
@@ -158,6 +162,21 @@ impl Files for Disk {
     }
 }
 
+/// Whether a file can be read at all: pipes and devices may never end, and what is too large is not begun.
+///
+/// # Errors
+/// It is not there, no file, or takes more memory than there may be used.
+pub fn regular(path: &Path) -> io::Result<()> {
+    let found = std::fs::metadata(path)?;
+    if found.is_dir() {
+        return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a folder"));
+    }
+    if !found.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "is a pipe or a device"));
+    }
+    memory::fits(found.len().into()).map_err(|fault| io::Error::new(io::ErrorKind::FileTooLarge, fault))
+}
+
 fn unreadable(path: &Path, error: &io::Error, named_by: Option<&Span>) -> Diagnostic {
     let name = path.display().to_string();
     let (what, hint) = match error.kind() {
@@ -166,6 +185,11 @@ fn unreadable(path: &Path, error: &io::Error, named_by: Option<&Span>) -> Diagno
             if named_by.is_some() { "paths are relative to the file that names them" } else { "check the path" },
         ),
         io::ErrorKind::IsADirectory => (format!("`{name}` is a folder, expected a file"), "name the file in it"),
+        io::ErrorKind::InvalidInput => {
+            (format!("`{name}` {error}: only files are read"), "write what comes out of it to a file first")
+        }
+        io::ErrorKind::FileTooLarge => (format!("`{name}` would take {error}"), memory::HINT),
+        _ if path.is_symlink() => (format!("cannot read `{name}`: {error}"), "check where the link leads"),
         _ => (format!("cannot read `{name}`: {error}"), "check its permissions"),
     };
     let diagnostic = Diagnostic::error("input/unreadable", what).hint(hint);

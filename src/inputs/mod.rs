@@ -4,15 +4,17 @@
 
 pub mod commands;
 mod disk;
+pub mod machine;
 
 use std::path::{Path, PathBuf};
+use std::sync::{PoisonError, RwLock};
 
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::map;
 use crate::mission::{self, Mission, PathSpec};
 use crate::pipeline::{Inputs, MapFile, TextFile};
 use crate::robot::spec;
-pub use disk::{Disk, Named, ReadFile};
+pub use disk::{Disk, Named, ReadFile, regular};
 
 /// Everything a mission names, read from disk.
 ///
@@ -120,6 +122,24 @@ pub fn read_map_file(path: &Path, disk: &Disk, named_by: Option<&crate::diag::Sp
         }
     };
     Ok(MapFile { name, bytes, beside })
+}
+
+static ALLOWED: RwLock<Vec<PathBuf>> = RwLock::new(Vec::new());
+
+/// Lets robots name meshes under these folders too, in the whole process.
+pub fn allow(folders: &[PathBuf]) {
+    let mut allowed = ALLOWED.write().unwrap_or_else(PoisonError::into_inner);
+    *allowed = folders.iter().map(|folder| absolute(folder)).collect();
+}
+
+/// Whether a path lies under a folder that was allowed.
+fn allowed(path: &Path) -> bool {
+    let path = absolute(path);
+    ALLOWED.read().unwrap_or_else(PoisonError::into_inner).iter().any(|folder| path.starts_with(folder))
+}
+
+fn absolute(path: &Path) -> PathBuf {
+    tidy(&std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()))
 }
 
 /// The folder a file lies in; `.` for a bare name.

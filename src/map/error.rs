@@ -1,6 +1,7 @@
 //! Why a map cannot be read.
 
 use crate::diag::{Describe, Diagnostic, Span};
+use crate::memory::{self, TooMuch};
 
 /// Endings that are read, for messages.
 pub(super) const FORMATS: &str = "point clouds .pcd, .ply, .las, .laz, .xyz, .txt, .csv and .npy (N x 3); voxels .npy (3-D, boolean or \
@@ -106,6 +107,9 @@ pub(super) enum MapError {
     /// The grid would not fit in memory.
     #[error("the grid would have {} x {} x {} cells of {resolution} m: more than can be handled", dims[0], dims[1], dims[2])]
     TooLarge { dims: [u64; 3], resolution: f64, enough: Option<f64> },
+    /// Reading would take more memory than there may be used.
+    #[error("{what} would take {fault}")]
+    Memory { what: &'static str, fault: TooMuch },
     /// Not a cell size.
     #[error("a resolution of {value} m cannot be used")]
     Resolution { value: f64, at: Option<Span> },
@@ -156,6 +160,11 @@ pub(super) enum MapError {
     Pixel { index: usize, value: u64, max: u32 },
 }
 
+/// Asks for memory.
+pub(super) fn room(what: &'static str, bytes: u128) -> Result<(), MapError> {
+    memory::fits(bytes).map_err(|fault| MapError::Memory { what, fault })
+}
+
 /// Digits that can be read: 1e300, not a one with 300 zeros.
 fn short(value: f64) -> String {
     if value.abs() < 1e12 { value.to_string() } else { format!("{value:e}") }
@@ -204,6 +213,7 @@ impl Describe for MapError {
                 d.hint(format!("resolution_m: {enough} would do, or cut the map to what is driven on"))
             }
             TooLarge { enough: None, .. } => d.hint("cut the map to what is driven on, or `height_m` to the robot's"),
+            Memory { .. } => d.hint(memory::HINT),
             NoLeaves => d.hint("an octree without known space says nothing about the floor: was it written before the first scan?"),
             TreeCut { .. } | NodesDiffer { .. } => {
                 d.hint("the file was cut off while it was written or copied, or its header lies; make it again")
@@ -256,7 +266,7 @@ impl MapError {
             LazDamaged { .. } => "map/damaged",
             NoPoints { .. } => "map/no-points",
             FarAway { .. } => "map/far-away",
-            TooLarge { .. } => "map/too-large",
+            TooLarge { .. } | Memory { .. } => "map/too-large",
             Resolution { .. } | NoResolution => "map/resolution",
             ResolutionDiffers { .. } => "map/resolution-differs",
             OriginUnused | Origin { .. } => "map/origin",

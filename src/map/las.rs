@@ -118,6 +118,7 @@ mod packed {
     use laz::{LasZipDecompressor, LazVlr};
 
     use super::{Header, MapError};
+    use crate::memory;
 
     /// Points unpacked at a time.
     const BATCH: u64 = 4096;
@@ -136,10 +137,12 @@ mod packed {
             source.seek(SeekFrom::Start(header.start as u64)).map_err(|e| e.to_string())?;
             let mut unpacker = LasZipDecompressor::new(source, layout).map_err(|e| e.to_string())?;
             let mut batch = vec![0; header.record * BATCH as usize];
-            let mut out = Vec::new();
+            let mut out: Vec<u8> = Vec::new();
             while done < header.points {
                 let points = BATCH.min(header.points - done) as usize;
                 let batch = &mut batch[..points * header.record];
+                // Points that are alike take next to nothing when packed: how many there are is known when they are there.
+                memory::fits(2 * out.len() as u128).map_err(|fault| format!("they take {fault}"))?;
                 unpacker.decompress_many(batch).map_err(|e| e.to_string())?;
                 batch.chunks_exact(header.record).for_each(|record| out.extend_from_slice(&record[..12]));
                 done += points as u64;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use serde::Deserialize;
 use serde_saphyr::Spanned;
 
-use super::error::MapError;
+use super::error::{MapError, room};
 use super::{FARTHEST, pgm, turned, voxelize};
 use super::{VoxelMap, voxelize::Slab};
 use crate::diag::{Source, Span};
@@ -178,6 +178,8 @@ pub(super) fn voxels(sheet: &Sheet, image: Option<&[u8]>, slab: Slab, unknown: U
     let layers = ((top - bottom) / sheet.resolution - 1e-9).ceil().max(1.0);
     let [width, height] = turned::size(image.width, image.height, sheet.yaw);
     voxelize::checked([width, height, layers as i64], sheet.resolution)?;
+    // A byte a cell before and after it is turned.
+    room("the turned image", 2 * width as u128 * height as u128)?;
     let meaning: Vec<Seen> =
         (0..=image.max).map(|value| sheet.meaning(f64::from(value) / f64::from(image.max))).collect();
     // The top row is the largest y.

@@ -6,9 +6,9 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use super::error::MapError;
+use super::error::{MapError, room};
 use super::header::Header;
-use super::points::{Column, Points, Scalar, lines, number, quote, words};
+use super::points::{Column, Points, Scalar, lines, list, number, quote, words};
 use super::{lzf, text};
 use crate::diag::{Span, nearest};
 
@@ -259,6 +259,7 @@ fn compressed(body: &[u8], layout: &Layout<'_>) -> Result<Points<'static>, MapEr
     }
     let packed_bytes = body.get(8..8 + packed as usize).ok_or_else(|| truncated(8 + u128::from(packed)))?;
     let expected = unpacked as usize;
+    room("the unpacked points", unpacked.into())?;
     let bytes =
         lzf::unpack(packed_bytes, expected).map_err(|(at, unpacked)| MapError::Damaged { at, unpacked, expected })?;
     let count = layout.points as usize;
@@ -280,7 +281,7 @@ fn ascii(body: &[u8], lines_before: u64, layout: &Layout<'_>) -> Result<Points<'
         width = width.saturating_add(field.count);
     }
     let columns = layout.xyz.map(|k| first[k]);
-    let mut list = Vec::new();
+    let mut list = list(body)?;
     for (line, row) in lines(body) {
         let line = line + lines_before;
         let got = words(row).count();

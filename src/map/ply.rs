@@ -5,9 +5,9 @@
 
 use std::borrow::Cow;
 
-use super::error::MapError;
+use super::error::{MapError, room};
 use super::header::Header;
-use super::points::{Column, Points, Scalar, lines, number, quote, words};
+use super::points::{Column, Points, Scalar, lines, list, number, quote, words};
 use crate::diag::Span;
 
 /// A kind of record.
@@ -198,6 +198,11 @@ fn walk(
     keep: bool,
 ) -> Result<Vec<[f64; 3]>, MapError> {
     let xyz = if keep { element.xyz()? } else { [usize::MAX; 3] };
+    if keep {
+        // A vertex takes three bytes at least, and a list grows by doubling.
+        let most = u128::from(element.count).min((body.len() / 3) as u128);
+        room("the vertices", 2 * most * size_of::<[f64; 3]>() as u128)?;
+    }
     let mut list = Vec::new();
     let begin = *at;
     for done in 0..element.count {
@@ -243,7 +248,7 @@ fn ascii(body: &[u8], lines_before: u64, elements: &[Element]) -> Result<Points<
     let mut rows = lines(body);
     for (index, element) in elements.iter().enumerate() {
         let is_vertex = element.name == "vertex";
-        let mut list = Vec::new();
+        let mut list = if is_vertex { list(body)? } else { Vec::new() };
         for have in 0..element.count {
             let Some((line, row)) = rows.next() else {
                 let unit = if is_vertex { "vertices" } else { "elements" };

@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+use super::error::{MapError, room};
+
 /// A number's type in a binary file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Scalar {
@@ -136,6 +138,13 @@ pub(super) fn number(word: &[u8]) -> Option<f64> {
 /// The non-blank lines of a text, each with its number (from 1) and without blanks at its ends.
 pub(super) fn lines(text: &[u8]) -> impl Iterator<Item = (u64, &[u8])> {
     (1..).zip(text.split(|b| *b == b'\n')).map(|(n, line)| (n, line.trim_ascii())).filter(|(_, line)| !line.is_empty())
+}
+
+/// A list with room for a point in every line of a text; lines that are none are rare.
+pub(super) fn list(text: &[u8]) -> Result<Vec<[f64; 3]>, MapError> {
+    let rows = text.iter().filter(|b| **b == b'\n').count() + 1;
+    room("the points", rows as u128 * size_of::<[f64; 3]>() as u128)?;
+    Ok(Vec::with_capacity(rows))
 }
 
 /// The words between blanks.

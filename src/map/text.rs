@@ -1,7 +1,7 @@
 //! Tables of points: .xyz, .txt, .csv. Separated by blanks, commas or semicolons, with or without a header.
 
 use super::error::MapError;
-use super::points::{Points, lines, number, quote};
+use super::points::{Points, lines, list, number, quote};
 
 /// Reads a table of points. Lines that begin with `#` or `//` are comments. Without a header the first three columns are
 /// x, y, z; more columns are ignored.
@@ -9,7 +9,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Points<'static>, MapError> {
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes); // byte-order mark of spreadsheets
     let mut columns = [0, 1, 2];
     let mut needed = 3;
-    let mut list = Vec::new();
+    let mut list = list(bytes)?;
     let mut first = true;
     for (line, row) in lines(bytes) {
         if row.starts_with(b"#") || row.starts_with(b"//") {

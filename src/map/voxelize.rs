@@ -4,6 +4,7 @@ use super::error::MapError;
 use super::npy::Voxels;
 use super::points::Points;
 use super::{FARTHEST, MapStatistics, VoxelMap};
+use crate::memory;
 use crate::mission::Unknown;
 
 /// Most cells of a grid. At one bit each that is half a gigabyte; a distance field of it would take 16.
@@ -40,7 +41,8 @@ pub(super) fn cell(p: f64, resolution: f64) -> i64 {
 pub(super) fn checked(cells: [i64; 3], resolution: f64) -> Result<[usize; 3], MapError> {
     let fits = |n: [u128; 3]| {
         let columns = n[0].saturating_mul(n[1]);
-        columns.saturating_mul(n[2]) <= MOST_CELLS && columns.saturating_mul(n[2].div_ceil(64)) <= MOST_WORDS
+        let words = columns.saturating_mul(n[2].div_ceil(64));
+        columns.saturating_mul(n[2]) <= MOST_CELLS && words <= MOST_WORDS && memory::fits(8 * words).is_ok()
     };
     let cells = cells.map(|n| n.max(1) as u64);
     if fits(cells.map(u128::from)) {

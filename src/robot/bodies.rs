@@ -59,13 +59,14 @@ pub(super) fn collision_shapes(
     faults: &mut Vec<Diagnostic>,
 ) -> Vec<Shape> {
     let mut out = Vec::new();
+    let levels = spec.urdf.as_ref().map_or(0, |urdf| shapes::levels(&urdf.value));
     for (l, link) in urdf.robot.links.iter().enumerate() {
         if spec.ignore_links.iter().any(|name| name.value == link.name) {
             continue;
         }
         let (body, body_from_link) = collapsed.links[l];
         for (collision, at) in link.collision.iter().zip(&urdf.collision_spans[l]) {
-            match shapes::convex(&collision.geometry, &urdf.source.name, files, at) {
+            match shapes::convex(&collision.geometry, (&urdf.source.name, levels), files, at) {
                 Ok((centre, convex)) => {
                     let pose = body_from_link * tree::pose(&collision.origin) * centre;
                     if !shapes::finite(&pose, &convex) {

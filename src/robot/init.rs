@@ -94,7 +94,7 @@ fn guessed_radius(urdf: &urdf::Urdf, tree: &tree::Tree, wheels: &Wheels, name: &
     for joint in wheels.all() {
         let (link, axis) = (tree.child[joint], tree::axis(&urdf.robot.joints[joint]));
         for (collision, at) in urdf.robot.links[link].collision.iter().zip(&urdf.collision_spans[link]) {
-            let Ok((centre, convex)) = shapes::convex(&collision.geometry, name, files, at) else { continue };
+            let Ok((centre, convex)) = shapes::convex(&collision.geometry, (name, 0), files, at) else { continue };
             let pose = tree::pose(&collision.origin) * centre;
             for across in [Vector3::x(), Vector3::y(), Vector3::z()].iter().filter(|d| d.dot(&axis).abs() < 0.5) {
                 let local = pose.rotation.inverse() * across;

@@ -41,6 +41,12 @@ pub trait Files {
     /// # Errors
     /// The I/O error.
     fn read(&mut self, path: &Path) -> std::io::Result<Vec<u8>>;
+
+    /// Whether a file that is not under the robot's folder may be read.
+    fn may_leave(&self, path: &Path) -> bool {
+        let _ = path;
+        false
+    }
 }
 
 /// The robot in its base frame: origin on the floor below the driving wheels' centre, x forward, y left, z up. SI, radians.

@@ -1,6 +1,6 @@
 //! Collision geometry of a link to convex shapes; meshes by their hull.
 
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use nalgebra::{Isometry3, Vector3};
 use urdf_rs::Geometry;
@@ -11,13 +11,14 @@ use crate::diag::{Diagnostic, Span};
 /// How many folders above the URDF's are searched for a package.
 const PACKAGE_LEVELS: usize = 5;
 
-/// The convex shape of one `<collision>` and its pose against the element's origin.
+/// The convex shape of one `<collision>` and its pose against the element's origin. `urdf`: its path, and how many [`levels`] below
+/// the robot's folder it lies.
 ///
 /// # Errors
-/// Meshes that are not found or cannot be read; `<capsule>`.
+/// Meshes that are not found, lie elsewhere or cannot be read; `<capsule>`.
 pub(super) fn convex(
     geometry: &Geometry,
-    urdf_path: &str,
+    urdf: (&str, usize),
     files: &mut dyn Files,
     at: &Span,
 ) -> Result<(Isometry3<f64>, Convex), Box<Diagnostic>> {
@@ -26,7 +27,7 @@ pub(super) fn convex(
         Geometry::Cylinder { radius, length } => Convex::Cylinder { radius: *radius, half_length: 0.5 * length },
         Geometry::Sphere { radius } => Convex::Sphere { radius: *radius },
         Geometry::Mesh { filename, scale } => {
-            let (path, bytes) = find(filename.trim(), urdf_path, files, at)?;
+            let (path, bytes) = find(filename.trim(), urdf, files, at)?;
             let points =
                 mesh::vertices(&path.to_string_lossy(), &bytes).map_err(|error| unreadable(&path, &error, at))?;
             return Ok(centred_hull(&points, scale.map_or([1.0; 3], |s| s.0)));
@@ -63,11 +64,19 @@ fn centred_hull(points: &[[f64; 3]], scale: [f64; 3]) -> (Isometry3<f64>, Convex
 }
 
 /// A mesh file by the name in the URDF.
-fn find(name: &str, urdf_path: &str, files: &mut dyn Files, at: &Span) -> Result<(PathBuf, Vec<u8>), Box<Diagnostic>> {
+fn find(
+    name: &str,
+    (urdf_path, levels): (&str, usize),
+    files: &mut dyn Files,
+    at: &Span,
+) -> Result<(PathBuf, Vec<u8>), Box<Diagnostic>> {
     let folder = Path::new(urdf_path).parent().unwrap_or(Path::new(""));
+    // A URDF alone in a ROS package: what belongs to it lies beside its folder.
+    let mut levels = levels.max(usize::from(folder.file_name().is_some_and(|name| name == "urdf")));
     let candidates: Vec<PathBuf> = if let Some(in_package) = name.strip_prefix("package://") {
         let without_package = in_package.split_once('/').map(|(_, rest)| rest);
         let names = [Some(in_package), without_package];
+        levels = 0;
         let places = upwards(folder);
         places.iter().flat_map(|place| names.iter().flatten().map(move |name| place.join(name))).collect()
     } else if let Some(plain) = name.strip_prefix("file://") {
@@ -82,6 +91,12 @@ fn find(name: &str, urdf_path: &str, files: &mut dyn Files, at: &Span) -> Result
     let ending = name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase()).unwrap_or_default();
     if !matches!(ending.as_str(), "stl" | "obj") {
         return Err(unreadable(Path::new(name), &mesh::MeshError::Format(ending), at));
+    }
+    let plain = name.split_once("://").map_or(name, |(_, plain)| plain);
+    if leaves(Path::new(plain), folder, levels) && !candidates.iter().all(|path| files.may_leave(path)) {
+        let message = format!("mesh {name} is not under the robot's folder");
+        let fault = Diagnostic::error("robot/mesh-outside", message).at(at);
+        return Err(Box::new(fault.hint("copy it there, or allow the folder that it lies in: --allow-path DIR")));
     }
     let mut reason = None;
     for path in &candidates {
@@ -101,14 +116,40 @@ fn find(name: &str, urdf_path: &str, files: &mut dyn Files, at: &Span) -> Result
     ))))
 }
 
+/// Folders that a `urdf: FOLDER/FILE.urdf` leads down from the robot.yaml, whose folder is the robot's.
+pub(super) fn levels(urdf: &Path) -> usize {
+    let mut parts = urdf.components();
+    parts.next_back();
+    let down = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
+    if parts.clone().all(down) { parts.filter(|part| matches!(part, Component::Normal(_))).count() } else { 0 }
+}
+
+/// Whether a path from `folder` leads out of the folder so many levels above it. (By its name: links are the user's own.)
+fn leaves(name: &Path, folder: &Path, levels: usize) -> bool {
+    let name = match name.strip_prefix(folder) {
+        Ok(below) if name.is_absolute() => below,
+        _ => name,
+    };
+    let mut depth = levels;
+    for part in name.components() {
+        depth = match part {
+            Component::Normal(_) => depth + 1,
+            Component::CurDir => depth,
+            Component::ParentDir if depth > 0 => depth - 1,
+            Component::ParentDir | Component::RootDir | Component::Prefix(_) => return true,
+        };
+    }
+    false
+}
+
 /// A folder and those above it, as far as packages are searched.
 fn upwards(folder: &Path) -> Vec<PathBuf> {
     let mut places = vec![folder.to_path_buf()];
     for _ in 0..PACKAGE_LEVELS {
         let last = places.last().expect("begins with the folder itself");
         let above = match last.components().next_back() {
-            Some(std::path::Component::Normal(_)) => last.parent().unwrap_or(Path::new("")).to_path_buf(),
-            Some(std::path::Component::RootDir | std::path::Component::Prefix(_)) => break,
+            Some(Component::Normal(_)) => last.parent().unwrap_or(Path::new("")).to_path_buf(),
+            Some(Component::RootDir | Component::Prefix(_)) => break,
             _ => last.join(".."),
         };
         places.push(above);
@@ -134,6 +175,28 @@ mod tests {
         assert_eq!(shown("a/b"), ["a/b", "a", "", "..", "../..", "../../.."]);
         assert_eq!(shown("/a"), ["/a", "/"]);
         assert_eq!(shown("../x")[..3], ["../x", "..", "../.."]);
+    }
+
+    #[test]
+    fn meshes_stay_under_the_robots_folder() {
+        for (name, levels, out) in [
+            ("meshes/a.stl", 0, false),
+            ("meshes/../a.stl", 0, false),
+            ("./a.stl", 0, false),
+            ("../meshes/a.stl", 0, true),
+            ("../meshes/a.stl", 1, false),
+            ("../../meshes/a.stl", 1, true),
+            ("m/../../../a.stl", 1, true),
+            ("/r/own/m/a.stl", 0, false),
+            ("/r/own/../a.stl", 0, true),
+            ("/etc/a.stl", 3, true),
+        ] {
+            assert_eq!(leaves(Path::new(name), Path::new("/r/own"), levels), out, "{name} from {levels}");
+        }
+        for (urdf, down) in [("a.urdf", 0), ("./urdf/a.urdf", 1), ("x/y/a.urdf", 2), ("../a.urdf", 0), ("/a/b.urdf", 0)]
+        {
+            assert_eq!(levels(Path::new(urdf)), down, "{urdf}");
+        }
     }
 
     #[test]

@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use blake3::Hash;
 
-use crate::cli::inputs::tidy;
+use crate::cli::inputs::{regular, tidy};
 
 /// The cache's file in the output folder.
 pub const CACHE: &str = ".trajc-build";
@@ -173,10 +173,8 @@ impl Hashes {
 
 /// The stamp of a file that was not written to within the last tick of the clock; waits where it was.
 fn settled(path: &Path) -> io::Result<Option<Stamp>> {
+    regular(path)?;
     let found = fs::metadata(path)?;
-    if found.is_dir() {
-        return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a folder"));
-    }
     let age = found.modified().ok().and_then(|modified| modified.elapsed().ok());
     match age.and_then(|age| TICK.checked_sub(age)) {
         // It may have been written to while we waited; then the next build sees another stamp and reads it.

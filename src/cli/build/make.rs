@@ -133,7 +133,7 @@ impl Site<'_> {
         if map_key(mission, Path::new(&file.name)).as_ref() != Some(key) {
             return;
         }
-        if mission.path.is_none() {
+        if mission.path.is_none() && place.has_room().is_ok() {
             place.field(1);
         }
         let names = std::iter::once(&file.name).chain(file.beside.as_ref().map(|(name, _)| name));

@@ -9,6 +9,7 @@ use super::message::MessageError;
 use super::{Attached, McapReadError, Topic};
 use crate::emit::cdr::Reader;
 use crate::emit::mcap::METADATA;
+use crate::memory;
 
 /// No record is longer than this, so that a length that lies does not take all memory.
 const LONGEST_RECORD: usize = 1 << 30;
@@ -28,6 +29,8 @@ pub struct Contents {
     schemas: BTreeMap<u16, String>,
     /// Log time and bytes of each message, in file order, by channel.
     messages: BTreeMap<u16, Messages>,
+    /// Bytes of all records so far: a chunk of a few kilobytes may unpack to gigabytes.
+    unpacked: u128,
 }
 
 impl Contents {
@@ -39,7 +42,7 @@ impl Contents {
         let mut contents = Self::default();
         let options = LinearReaderOptions::default()
             .with_emit_chunks(true)
-            .with_record_length_limit(LONGEST_RECORD)
+            .with_record_length_limit(longest_record())
             .with_validate_data_section_crc(true)
             .with_validate_summary_section_crc(true);
         each_record(bytes, options, &mut |opcode, body| match opcode {
@@ -50,6 +53,9 @@ impl Contents {
     }
 
     fn chunk(&mut self, body: &[u8]) -> Result<(), McapReadError> {
+        if !fits(op::CHUNK, body) {
+            return Err(McapReadError::Overrun);
+        }
         let Record::Chunk { header, data } = ::mcap::parse_record(op::CHUNK, body)? else { return Ok(()) };
         if header.compression.is_empty() {
             check_lengths(&data)?;
@@ -61,15 +67,22 @@ impl Contents {
         let options = LinearReaderOptions::default()
             .with_skip_start_magic(true)
             .with_skip_end_magic(true)
-            .with_record_length_limit(LONGEST_RECORD)
+            .with_record_length_limit(longest_record())
             .with_prevalidate_chunk_crcs(true);
         each_record(&alone, options, &mut |opcode, body| self.record(opcode, body))
     }
 
     fn record(&mut self, opcode: u8, body: &[u8]) -> Result<(), McapReadError> {
-        if opcode == op::ATTACHMENT && !attachment_fits(body) {
+        if ![op::SCHEMA, op::CHANNEL, op::MESSAGE, op::ATTACHMENT, op::METADATA].contains(&opcode) {
+            return Ok(());
+        }
+        if !fits(opcode, body) {
             return Err(McapReadError::Overrun);
         }
+        // What keeps a message or a name, beside its bytes.
+        const KEPT: usize = 64;
+        self.unpacked += (body.len() + KEPT) as u128;
+        memory::fits(self.unpacked)?;
         match ::mcap::parse_record(opcode, body)? {
             Record::Channel(channel) => {
                 self.channels.insert(channel.id, (channel.topic, channel.schema_id));
@@ -132,6 +145,10 @@ impl Contents {
     }
 }
 
+fn longest_record() -> usize {
+    usize::try_from(memory::cap()).unwrap_or(LONGEST_RECORD).min(LONGEST_RECORD)
+}
+
 /// Takes a record's opcode and body.
 type Visit<'a> = dyn FnMut(u8, &[u8]) -> Result<(), McapReadError> + 'a;
 
@@ -161,18 +178,37 @@ fn check_lengths(mut chunk: &[u8]) -> Result<(), McapReadError> {
     Ok(())
 }
 
-/// Whether the parts of an attachment record lie within it. (The MCAP reader takes its last four bytes for granted.)
-fn attachment_fits(body: &[u8]) -> bool {
-    // Behind log time and create time.
-    let name = Some(16);
-    let media_type = name.and_then(|at| behind_string(body, at));
-    let length = media_type.and_then(|at| behind_string(body, at));
-    // The length of the data, the data, a checksum.
-    length.is_some_and(|at| body.len() >= at + 8 + 4)
+/// Whether the texts of a record lie within it. (The MCAP reader takes memory for as many bytes as a length says, and the last four
+/// bytes of an attachment for granted.)
+fn fits(opcode: u8, body: &[u8]) -> bool {
+    let end = match opcode {
+        op::SCHEMA => strings(body, 2, 3),
+        op::CHANNEL => strings(body, 4, 2).and_then(|at| behind_map(body, at)),
+        op::METADATA => strings(body, 0, 1).and_then(|at| behind_map(body, at)),
+        // Behind three whole numbers and a checksum.
+        op::CHUNK => strings(body, 28, 1),
+        // Behind two times; before the length of the data, the data and a checksum.
+        op::ATTACHMENT => strings(body, 16, 2).filter(|at| body.len() >= at + 8 + 4),
+        _ => Some(0),
+    };
+    end.is_some()
 }
 
-/// Where the string at `at` ends; `None`: beyond the record.
-fn behind_string(body: &[u8], at: usize) -> Option<usize> {
+/// Where so many strings from `at` on end; `None`: beyond the record.
+fn strings(body: &[u8], at: usize, count: usize) -> Option<usize> {
+    (0..count).try_fold(at, |at, _| {
+        let length = u32::from_le_bytes(body.get(at..at + 4)?.try_into().ok()?) as usize;
+        Some(at + 4 + length).filter(|end| *end <= body.len())
+    })
+}
+
+/// Where a map of strings at `at` ends: its length in bytes, then pairs until there are as many.
+fn behind_map(body: &[u8], at: usize) -> Option<usize> {
     let length = u32::from_le_bytes(body.get(at..at + 4)?.try_into().ok()?) as usize;
-    Some(at + 4 + length).filter(|end| *end <= body.len())
+    let begin = at + 4;
+    let mut at = begin;
+    while at - begin < length {
+        at = strings(body, at, 2)?;
+    }
+    Some(at)
 }

@@ -100,6 +100,20 @@ pub enum GivenError {
         /// The row.
         at: Span,
     },
+    /// A coordinate that no robot drives to.
+    #[error("line {line}: `{column}` is {value:e} m: farther than {limit} m from the origin")]
+    FarAway {
+        /// From 1.
+        line: usize,
+        /// The column.
+        column: String,
+        /// m.
+        value: f64,
+        /// m.
+        limit: f64,
+        /// The row.
+        at: Span,
+    },
     /// Two rows at one point: the chord between them has no direction.
     #[error("line {line}: the same point as in the row before")]
     RepeatedPoint {
@@ -157,6 +171,7 @@ impl Describe for GivenError {
             Self::DoubleColumn { at, .. } => Diagnostic::error("path/double-column", self).at(at),
             Self::Ragged { at, .. } => Diagnostic::error("path/ragged", self).at(at),
             Self::NotANumber { at, .. } => Diagnostic::error("path/not-a-number", self).at(at),
+            Self::FarAway { at, .. } => Diagnostic::error("path/far-away", self).at(at).hint("metres are expected"),
             Self::RepeatedPoint { at, .. } => {
                 Diagnostic::error("path/repeated-point", self).at(at).hint("leave one of the two rows out")
             }

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::diag::shape::LARGE;
 use crate::diag::{Source, Span, nearest};
 use crate::math::poly::Piece;
 use crate::robot::{MovingJoint, RobotModel};
@@ -67,7 +68,11 @@ impl Table {
             for ((text, column), title) in cells.texts.iter().zip(&columns).zip(&header.texts) {
                 match (text.parse::<f64>(), column) {
                     (_, Column::Unknown) => {}
-                    (Ok(value), Column::Plane(d)) if value.is_finite() => row.point[*d] = value,
+                    (Ok(value), Column::Plane(d)) if value.abs() <= LARGE => row.point[*d] = value,
+                    (Ok(value), Column::Plane(_)) if value.is_finite() => {
+                        let (column, at) = (title.clone(), at.clone());
+                        errors.push(GivenError::FarAway { line, column, value, limit: LARGE, at });
+                    }
                     (Ok(value), Column::Joint(j)) if value.is_finite() => row.joints[*j] = Some(value),
                     _ => errors.push(GivenError::NotANumber {
                         line,

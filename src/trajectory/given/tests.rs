@@ -129,6 +129,8 @@ fn faults_of_a_csv_file_are_all_named_with_their_lines() {
             ("path/not-a-number", at("4,east"))
         ]
     );
+    // Found by fuzzing: its length took seconds to find.
+    assert_eq!(codes("x_m,y_m\n0,0\n1e12,0.5\n2,0.4"), [("path/far-away", at("1e12,0.5"))]);
     assert_eq!(codes("x_m,y_m\n0,0\n1,1\n# same\n1,1\n2,2\n"), [("path/repeated-point", at("1,1"))]);
     assert_eq!(codes("x_m,y_m\n0,0\n1,0\n0,0\n"), [("path/turns-back", at("1,0"))]);
     assert_eq!(
