@@ -74,6 +74,7 @@ fn refusal(refusals: &[Refusal]) -> Option<Failure> {
 fn refusal_kind(kind: RefusalKind) -> &'static str {
     match kind {
         RefusalKind::Clearance => "clearance",
+        RefusalKind::Tolerance => "tolerance",
         RefusalKind::OwnLinks => "own_links",
         RefusalKind::Limit => "limit",
         RefusalKind::Position => "position",
@@ -283,6 +284,7 @@ mod tests {
                 obstacle: Some(Aabb { min: [4.0, 4.05, 0.25], max: [4.05, 4.1, 0.3] }),
                 distance: 0.0523,
             }),
+            tolerance: None,
             own_links: None,
             end_point_error: 4e-5,
             end_heading_error: None,
