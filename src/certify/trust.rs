@@ -31,6 +31,11 @@ pub struct Trust {
 }
 
 impl Trust {
+    /// The end of the motion.
+    pub fn end(&self) -> TubePoint {
+        self.tube[self.tube.len() - 1]
+    }
+
     /// The end of what can be trusted; of the whole motion where there is no contact.
     pub fn until(&self) -> TubePoint {
         self.tube[self.contact.unwrap_or(self.tube.len() - 1)]
