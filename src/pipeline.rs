@@ -312,12 +312,22 @@ impl Finish<'_> {
 
     /// The same of a task that is not the mission's.
     fn certify_task(&self, run: &mut Run<'_>, trajectory: Trajectory, task: &Task) -> Result<Made, Diagnostics> {
-        let options = RetimeOptions { law: self.law(&trajectory), sampling_time: self.sampling_time };
-        let profile = run.stage("retime", || retime::retime(&trajectory, self.robot, &options))?;
-        let options = SampleOptions { sampling_time: self.sampling_time, sampling: self.mission.sampling };
-        let commands = run.stage("command", || command::sample(&profile, self.robot, &options))?;
+        let (profile, commands) = self.commands(run, &trajectory)?;
         let certificate = run.stage("certify", || certify::certify(&commands, self.robot, self.map, task));
         Ok(Made { trajectory, profile, commands, certificate })
+    }
+
+    /// A trajectory timed and sampled.
+    fn commands(
+        &self,
+        run: &mut Run<'_>,
+        trajectory: &Trajectory,
+    ) -> Result<(MotionProfile, CommandTable), Diagnostics> {
+        let options = RetimeOptions { law: self.law(trajectory), sampling_time: self.sampling_time };
+        let profile = run.stage("retime", || retime::retime(trajectory, self.robot, &options))?;
+        let options = SampleOptions { sampling_time: self.sampling_time, sampling: self.mission.sampling };
+        let commands = run.stage("command", || command::sample(&profile, self.robot, &options))?;
+        Ok((profile, commands))
     }
 
     /// The mission's time law, where it can time this trajectory.

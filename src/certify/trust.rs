@@ -17,6 +17,14 @@ pub struct TubePoint {
     pub length: f64,
     /// How far the robot can be off.
     pub width: Width,
+    /// Where the base is, m.
+    pub place: [f64; 2],
+    /// How: the base's origin by -1 to 1 times each of these, m (wheels alike, track, wheels apart, heading at the start),
+    pub drift: [[f64; 2]; 4],
+    /// the heading with each by this, rad,
+    pub turning: [f64; 4],
+    /// and any point of the robot by this in any direction, m.
+    pub anywhere: f64,
 }
 
 /// How far commands can be trusted by a robot within a tolerance and without feedback.
@@ -71,7 +79,17 @@ pub fn trust(
 fn along(rollout: &Rollout<'_>, tube: &Tube<'_>) -> Vec<TubePoint> {
     let mut length = 0.0;
     let point = |row: usize| {
-        let point = TubePoint { time: rollout.time(row, 0.0), length, width: tube.width(row, 0.0) };
+        let (drift, turning) = tube.parts(row);
+        let pose = rollout.pose(row, 0.0);
+        let point = TubePoint {
+            time: rollout.time(row, 0.0),
+            length,
+            width: tube.width(row, 0.0),
+            place: [pose.x, pose.y],
+            drift: drift.map(|v| [v.x, v.y]),
+            turning,
+            anywhere: tube.anywhere(row),
+        };
         length += rollout.held(row).speed.abs() * rollout.step();
         point
     };

@@ -65,7 +65,7 @@ impl Shares {
 }
 
 /// The largest magnitudes of the deviations: rho, sigma, delta, psi.
-type Box4 = [f64; 4];
+pub(super) type Box4 = [f64; 4];
 
 /// The tube around a replay.
 #[derive(Debug)]
@@ -100,7 +100,7 @@ struct Node {
 }
 
 /// Deviations of the position per deviation: along rho, sigma, delta, psi.
-type Drift = [Vector2<f64>; 4];
+pub(super) type Drift = [Vector2<f64>; 4];
 
 fn unit(yaw: f64) -> Vector2<f64> {
     Vector2::new(yaw.cos(), yaw.sin())
@@ -224,6 +224,22 @@ impl<'a> Tube<'a> {
         let drift = self.drift(&node);
         let scaled: Drift = std::array::from_fn(|i| drift[i] * self.deviations[i]);
         Width { distance: farthest(&scaled) + node.rest + self.tolerance.start_distance, angle: self.heading(&node).0 }
+    }
+
+    /// What the deviations do when a row begins, at their largest: to the base's origin and to the heading.
+    pub(super) fn parts(&self, row: usize) -> (Drift, Box4) {
+        let node = &self.nodes[row];
+        let (drift, turning) = (self.drift(node), self.turning(node));
+        (
+            std::array::from_fn(|i| drift[i] * self.deviations[i]),
+            std::array::from_fn(|i| turning[i] * self.deviations[i]),
+        )
+    }
+
+    /// How far points of the robot can be off in any direction beside, m; what the second order does to their own arms left out.
+    pub(super) fn anywhere(&self, row: usize) -> f64 {
+        let late = (0..self.levers.len()).map(|shape| self.lateness(row, shape)).fold(0.0, f64::max);
+        self.tolerance.start_distance + self.nodes[row].rest + late
     }
 
     /// What each tolerance adds to the displacement of a point at `place` (map frame) of a shape, `tau` seconds into a row.

@@ -1,10 +1,13 @@
 //! Searching and optimising until something is certified.
 
 use super::{CompileOptions, Finish, Made, Place, Run, stops};
-use crate::certify::Task;
+use crate::certify::{self, RefusalKind, Task};
+use crate::command::CommandTable;
 use crate::diag::{Describe, Diagnostics};
 use crate::geom::Pose2;
+use crate::mission::Tolerance;
 use crate::mission::{Mission, Parameterisation, PoseSpec};
+use crate::optimize::slack::{Slack, Slackened, Slacks};
 use crate::optimize::{self, OptimizeOptions};
 use crate::report::metrics;
 use crate::report::schema::{InitialPart, SearchPart};
@@ -24,6 +27,10 @@ const FIRST_MARGIN: f64 = 0.013;
 const MISSED_TIMES: f64 = 1.5;
 /// What counts of it at most, m.
 const MISSED_MOST: f64 = 0.015;
+
+/// A motion that is still too narrow for the tolerance is tried again while that gains so much, m, once in so many tries.
+const GAINED: f64 = 1e-3;
+const IDLE: usize = 3;
 
 /// How a try of the optimiser goes about it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,8 +57,18 @@ pub(super) fn plan(
     let path = route(run, finish, map, compile, &query).map_err(|error| place_search_error(finish.mission, &error))?;
     note(run, &path, finish.robot);
     let task = |trajectory: &Trajectory| finish.task(trajectory);
-    let made = optimise(run, finish, map, compile, &path, &task);
+    let made = optimise(run, finish, map, compile, &path, &task, None);
     if made.as_ref().is_ok_and(|made| made.certificate.holds()) {
+        return made;
+    }
+    if let Ok(refused) = &made
+        && let Some(wider) = wider_route(run, finish, map, compile, &query, refused)
+    {
+        let again = optimise(run, finish, map, compile, &wider, &task, None);
+        if again.as_ref().is_ok_and(|made| made.certificate.holds()) {
+            note(run, &wider, finish.robot);
+            return again;
+        }
         return made;
     }
     // Between the postures that were sampled something may have been in the way: another path leads by others.
@@ -59,13 +76,74 @@ pub(super) fn plan(
     let options = search_options(finish.mission, SEARCH_MARGIN);
     let other = run.stage("search", || search::with_more_postures(map, field, finish.robot, &query, &options));
     let Some(other) = other else { return made };
-    match optimise(run, finish, map, compile, &other, &task) {
+    match optimise(run, finish, map, compile, &other, &task, None) {
         Ok(better) if better.certificate.holds() => {
             note(run, &other, finish.robot);
             Ok(better)
         }
         _ => made,
     }
+}
+
+/// Another path, where that of a refused motion was too narrow for the tolerance alone: what the robot may be off there comes off every
+/// distance beside it. `None`: there is none, or the tolerance was not the reason.
+fn wider_route(
+    run: &mut Run<'_>,
+    finish: &Finish<'_>,
+    map: &Place,
+    compile: &CompileOptions,
+    query: &Query,
+    refused: &Made,
+) -> Option<SearchPath> {
+    let tolerance = finish.robot.tolerance.filter(|_| too_narrow_for_the_tolerance(refused))?;
+    let task = finish.task(&refused.trajectory);
+    let slacks = slacks(&refused.commands, finish.robot, &task, tolerance, 0)?;
+    let field = map.field(compile.threads);
+    run.stage("search", || {
+        let lowered = field.lowered(|place| slacks.aside(place));
+        search::search(map, &lowered, finish.robot, query, &search_options(finish.mission, SEARCH_MARGIN)).ok()
+    })
+}
+
+/// Whether a certificate refuses nothing but that every robot within the tolerance fits.
+fn too_narrow_for_the_tolerance(made: &Made) -> bool {
+    let refusals = &made.certificate.refusals;
+    !refusals.is_empty() && refusals.iter().all(|refusal| refusal.kind == RefusalKind::Tolerance)
+}
+
+/// What a stretch has behind it: commands from the mission's start on.
+pub(super) struct Since {
+    /// Where they start.
+    pub(super) start: (Pose2, Vec<f64>),
+    /// They end at rest.
+    pub(super) commands: CommandTable,
+}
+
+impl Since {
+    /// These commands and a stretch's, as one, with the task of both.
+    fn with(&self, stretch: &CommandTable, task: &Task) -> (CommandTable, Task) {
+        let mut whole = self.commands.clone();
+        whole.rows.pop();
+        whole.rows.extend_from_slice(&stretch.rows);
+        (whole, Task { start: self.start.0, start_joints: self.start.1.clone(), ..task.clone() })
+    }
+}
+
+/// How far robots may be off along commands from row `first` on.
+fn slacks(
+    commands: &CommandTable,
+    robot: &RobotModel,
+    task: &Task,
+    tolerance: Tolerance,
+    first: usize,
+) -> Option<Slacks> {
+    let tube = certify::tube_along(commands, robot, task, tolerance);
+    Slacks::along(tube.into_iter().skip(first).map(|point| Slack {
+        place: point.place,
+        drift: point.drift,
+        turning: point.turning,
+        anywhere: point.anywhere,
+    }))
 }
 
 fn search_options(mission: &Mission, margin: f64) -> SearchOptions {
@@ -107,13 +185,27 @@ pub(super) fn optimise(
     compile: &CompileOptions,
     path: &SearchPath,
     task: &dyn Fn(&Trajectory) -> Task,
+    since: Option<&Since>,
 ) -> Result<Made, Diagnostics> {
     let (mission, robot) = (finish.mission, finish.robot);
     let asked = compile.parameterisation.unwrap_or(mission.parameterisation);
     let field = map.field(compile.threads);
     let certify = |run: &mut Run<'_>, trajectory: Trajectory| {
         let task = task(&trajectory);
-        finish.certify_task(run, trajectory, &task)
+        let mut made = finish.certify_task(run, trajectory, &task)?;
+        if let Some(since) = since.filter(|_| robot.tolerance.is_some()) {
+            let (whole, task) = since.with(&made.commands, &task);
+            made.certificate = run.stage("certify", || certify::certify(&whole, robot, finish.map, &task));
+        }
+        Ok::<Made, Diagnostics>(made)
+    };
+    // How far robots may be off along commands, by what they have behind them.
+    let slacks = |commands: &CommandTable, task: &Task, tolerance: Tolerance| match since {
+        None => slacks(commands, robot, task, tolerance, 0),
+        Some(since) => {
+            let (whole, task) = since.with(commands, task);
+            slacks(&whole, robot, &task, tolerance, whole.rows.len() - commands.rows.len())
+        }
     };
     if path.length() == 0.0 {
         return certify(run, path.trajectory());
@@ -130,6 +222,15 @@ pub(super) fn optimise(
     };
     let mut refused: Option<Trajectory> = None;
     let mut missed = 0.0f64;
+    // Of those that only the tolerance refuses, the one that is nearest to it.
+    let mut nearest: Option<(f64, Made)> = None;
+    let mut idle = 0;
+    let mut slack = robot.tolerance.and_then(|tolerance| {
+        let trajectory = path.trajectory();
+        let task = task(&trajectory);
+        let (_, commands) = finish.commands(run, &trajectory).ok()?;
+        slacks(&commands, &task, tolerance)
+    });
     let tries = [asked].into_iter().chain(other).flat_map(of);
     for (parameterisation, margin, look) in tries {
         let usual = if compile.spins { OptimizeOptions::default() } else { OptimizeOptions::without_spins() };
@@ -139,9 +240,10 @@ pub(super) fn optimise(
             options.steer = options.steer.closer();
             options.clearance += MISSED_TIMES * missed;
         }
-        let trajectory = run.stage("optimize", || match refused.take().filter(|_| look == Look::Again) {
-            Some(refused) => optimize::resume(path, field, robot, &options, &refused),
-            None => optimize::optimize(path, field, robot, &options),
+        let before = refused.take().filter(|_| look == Look::Again);
+        let trajectory = run.stage("optimize", || match &slack {
+            None => make(path, field, robot, &options, before.as_ref()),
+            Some(slacks) => make(path, &Slackened { field, slacks }, robot, &options, before.as_ref()),
         });
         refused = Some(trajectory.clone());
         // A trajectory that no law can time is one more reason to go on to the next try.
@@ -152,8 +254,40 @@ pub(super) fn optimise(
         if let Some(closest) = &made.certificate.closest {
             missed = missed.max((mission.clearance - closest.distance).clamp(0.0, MISSED_MOST));
         }
+        if let Some(tolerance) = robot.tolerance {
+            let inside = made.certificate.tolerance.as_ref().and_then(|inside| inside.closest.as_ref());
+            let short = inside.map_or(0.0, |closest| mission.clearance - closest.distance);
+            missed = missed.max(short.clamp(0.0, MISSED_MOST));
+            slack = slacks(&made.commands, &task(&made.trajectory), tolerance);
+            let least = nearest.as_ref().map_or(f64::INFINITY, |(least, _)| *least);
+            idle = if short < least - GAINED { 0 } else { idle + 1 };
+            if too_narrow_for_the_tolerance(&made) && nearest.as_ref().is_none_or(|(least, _)| short < *least) {
+                nearest = Some((short, made));
+            }
+            if short > GAINED && idle >= IDLE {
+                break;
+            }
+        }
     }
-    certify(run, path.trajectory())
+    let last = certify(run, path.trajectory());
+    match (last, nearest) {
+        (Ok(last), Some((_, nearest))) if !last.certificate.holds() => Ok(nearest),
+        (last, _) => last,
+    }
+}
+
+/// A motion along a path, from the beginning or from one that was refused.
+fn make<F: optimize::DistanceField>(
+    path: &SearchPath,
+    field: &F,
+    robot: &RobotModel,
+    options: &OptimizeOptions,
+    refused: Option<&Trajectory>,
+) -> Trajectory {
+    match refused {
+        Some(refused) => optimize::resume(path, field, robot, options, refused),
+        None => optimize::optimize_in(path, field, robot, options),
+    }
 }
 
 /// What the search is asked.
