@@ -13,7 +13,7 @@ use super::obstacles::{Edge, Obstacles};
 use super::rollout::Rollout;
 use super::tube::{Shares, Tube, Width};
 use super::{Closest, Refusal, RefusalKind};
-use crate::geom::Aabb;
+use crate::geom::{Aabb, Pose2};
 use crate::map::VoxelMap;
 use crate::robot::RobotModel;
 
@@ -407,21 +407,33 @@ impl<'a> Search<'a> {
             };
             let message = match &there {
                 None => too_near(closest, required, proven),
-                Some(there) => too_wide(closest, required, there),
+                Some(there) => {
+                    let at = self.witness.map_or_else(Pose2::default, |at| self.rollout.pose(at.row, at.tau));
+                    too_wide(closest, at, required, there)
+                }
             };
             Refusal { kind, message, time: Some(closest.time) }
         });
         Clearance { proven, closest, there, refusal }
     }
 
-    /// The tube at a witness: its width, and what makes the shape's point there move that is nearest to the obstacle.
+    /// The tube at a witness: its width, and what brings the shape's point nearer there that is nearest to the obstacle.
     fn width_and_shares(&self, at: Witness, tube: &Tube<'_>) -> (Width, Shares) {
         let mut joints = Vec::new();
         let mut bodies = Vec::new();
         self.rollout.joints_at(at.row, at.tau, &mut joints);
         self.kinematics.bodies(&joints, self.rollout.held(at.row), &mut bodies);
-        let shape = self.kinematics.shape(at.shape, &bodies, self.rollout.pose(at.row, at.tau), 0.0);
-        (tube.width(at.row, at.tau), tube.shares(at.row, at.tau, at.shape, shape.posed.centre.xy()))
+        let posed = self.kinematics.shape(at.shape, &bodies, self.rollout.pose(at.row, at.tau), 0.0).posed;
+        let bounds = posed.bounds();
+        let sides = self.obstacles.edges.iter();
+        let side = sides.min_by(|a, b| beyond(a, &bounds).total_cmp(&beyond(b, &bounds)));
+        let toward = match &at.obstacle {
+            Some(obstacle) => posed.separation(obstacle).normal,
+            None => side.map(|edge| Vector3::ith(edge.axis, edge.sign)),
+        };
+        let toward = toward.unwrap_or_else(Vector3::zeros);
+        let point = posed.centre + posed.support(&toward);
+        (tube.width(at.row, at.tau), tube.shares((at.row, at.tau), at.shape, point.xy(), toward.xy()))
     }
 
     fn closest(&self, witness: Witness) -> Closest {
@@ -475,13 +487,15 @@ fn too_near(closest: &Closest, required: f64, proven: f64) -> String {
 }
 
 /// Why a tube's clearance does not suffice: where, by how much, and which tolerance has most to do with it.
-fn too_wide(closest: &Closest, required: f64, (width, shares): &(Width, Shares)) -> String {
+fn too_wide(closest: &Closest, at: Pose2, required: f64, (width, shares): &(Width, Shares)) -> String {
     let Closest { time, link, obstacle, distance } = closest;
     let (key, most) = shares.most();
     format!(
-        "too narrow for the tolerance by {:.4} m at t = {time:.3} s: {required:.4} m from {what} are required, and `{link}` may come {near}; \
-         the robot may be off by {:.4} m and {:.2} degrees there, of which `{key}` makes {most:.4} m",
+        "too narrow for the tolerance by {:.4} m at t = {time:.3} s, the base at ({:.2}, {:.2}): {required:.4} m from {what} are required, and `{link}` may come {near}; \
+         the robot may be off by {:.4} m and {:.2} degrees there, and `{key}` brings it nearer most, by {most:.4} m",
         required - distance,
+        at.x,
+        at.y,
         width.distance,
         width.angle.to_degrees(),
         what = named(obstacle),

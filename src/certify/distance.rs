@@ -121,7 +121,7 @@ impl Posed<'_> {
     }
 
     /// The point that is farthest along `d`, from the centre.
-    fn support(&self, d: &Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn support(&self, d: &Vector3<f64>) -> Vector3<f64> {
         let own = |d: &Vector3<f64>| self.turn * self.convex.support(&self.turn.tr_mul(d));
         let Some(spread) = &self.spread else { return own(d) };
         let [one, other] = spread.turned(d);

@@ -128,7 +128,7 @@ pub struct InTube {
     pub clearance_proven: Option<f64>,
     /// Where it is least; `distance`: of the robot that comes nearest, by the bounds that the proof rests on.
     pub closest: Option<Closest>,
-    /// How wide the tube is there, and what each tolerance adds.
+    /// How wide the tube is there, and how much nearer each tolerance may bring the robot.
     pub there: Option<(Width, Shares)>,
 }
 

@@ -23,8 +23,10 @@ pub struct TubePoint {
     pub drift: [[f64; 2]; 4],
     /// the heading with each by this, rad,
     pub turning: [f64; 4],
-    /// and any point of the robot by this in any direction, m.
+    /// and by this in any direction, m.
     pub anywhere: f64,
+    /// How far joints that are late move any point besides, m.
+    pub late: f64,
 }
 
 /// How far commands can be trusted by a robot within a tolerance and without feedback.
@@ -89,6 +91,7 @@ fn along(rollout: &Rollout<'_>, tube: &Tube<'_>) -> Vec<TubePoint> {
             drift: drift.map(|v| [v.x, v.y]),
             turning,
             anywhere: tube.anywhere(row),
+            late: tube.late(row),
         };
         length += rollout.held(row).speed.abs() * rollout.step();
         point

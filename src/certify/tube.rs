@@ -27,7 +27,7 @@ pub struct Width {
     pub angle: f64,
 }
 
-/// What each tolerance adds to a displacement, to first order, m.
+/// How much nearer to an obstacle each tolerance may bring a robot, to first order, m.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Shares {
     /// Of `wheel_radius`.
@@ -236,26 +236,37 @@ impl<'a> Tube<'a> {
         )
     }
 
-    /// How far points of the robot can be off in any direction beside, m; what the second order does to their own arms left out.
+    /// How far the base can be off in any direction beside, m.
     pub(super) fn anywhere(&self, row: usize) -> f64 {
-        let late = (0..self.levers.len()).map(|shape| self.lateness(row, shape)).fold(0.0, f64::max);
-        self.tolerance.start_distance + self.nodes[row].rest + late
+        self.tolerance.start_distance + self.nodes[row].rest
     }
 
-    /// What each tolerance adds to the displacement of a point at `place` (map frame) of a shape, `tau` seconds into a row.
-    pub(super) fn shares(&self, row: usize, tau: f64, shape: usize, place: Vector2<f64>) -> Shares {
+    /// How far joints that are late, or early, move any point of the robot while a row is held, m.
+    pub(super) fn late(&self, row: usize) -> f64 {
+        (0..self.levers.len()).map(|shape| self.lateness(row, shape)).fold(0.0, f64::max)
+    }
+
+    /// How much farther each tolerance alone lets a point at `place` of a shape be along `toward`, `tau` seconds into a row: a direction in the
+    /// plane, unit length or less.
+    pub(super) fn shares(
+        &self,
+        (row, tau): (usize, f64),
+        shape: usize,
+        place: Vector2<f64>,
+        toward: Vector2<f64>,
+    ) -> Shares {
         let node = self.node(row, tau);
         let pose = self.rollout.pose(row, tau);
         let arm = left(place - Vector2::new(pose.x, pose.y));
         let (drift, turning) = (self.drift(&node), self.turning(&node));
-        let of = |i: usize| self.deviations[i] * (drift[i] + arm * turning[i]).norm();
+        let of = |i: usize| self.deviations[i] * (drift[i] + arm * turning[i]).dot(&toward).abs();
         Shares {
             wheel_radius: of(0),
             track: of(1),
             wheel_difference: of(2),
             start_angle: of(3),
             latency: self.lateness(row, shape),
-            start_distance: self.tolerance.start_distance,
+            start_distance: self.tolerance.start_distance * toward.norm(),
         }
     }
 

@@ -142,7 +142,7 @@ fn slacks(
         place: point.place,
         drift: point.drift,
         turning: point.turning,
-        anywhere: point.anywhere,
+        anywhere: point.anywhere + point.late,
     }))
 }
 

@@ -303,7 +303,7 @@ pub struct InTubePart {
     /// How far the heading may be off there, rad.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub closest_off_rad: Option<f64>,
-    /// What each tolerance adds there to how far the link may be off, m, by its key in a mission.
+    /// How much nearer each tolerance may bring the link there, m, by its key in a mission.
     #[serde(default, skip_serializing_if = "std::collections::BTreeMap::is_empty")]
     pub closest_shares_m: std::collections::BTreeMap<String, f64>,
     /// How far the base may be off at the end, m.

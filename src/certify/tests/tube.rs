@@ -88,7 +88,7 @@ proptest! {
         let kinematics = Kinematics::new(&robot);
         let Some(normal) = Vector3::from(normal).try_normalize(0.1) else { return Ok(()) };
         let (mut joints, mut bodies, mut late) = (Vec::new(), Vec::new(), Vec::new());
-        for row in 0..held.len() {
+        for (row, own_pose) in own_poses.iter().enumerate().take(held.len()) {
             let (middle, half) = (0.5 * step, 0.5 * step * part);
             for shape in 0..robot.shapes.len() {
                 let mut loose = |tau: f64, half: f64| {
@@ -111,7 +111,7 @@ proptest! {
                     let other = ((time / step) as usize).min(held.len());
                     rollout.joints_at(other, time - table.time(other), &mut late);
                     let (speed, turn_rate) = own.twist(row);
-                    let pose = own_poses[row].after_twist(speed, turn_rate, tau);
+                    let pose = own_pose.after_twist(speed, turn_rate, tau);
                     let real = pose.isometry() * robot.shape_poses(&late)[shape];
                     let local = real.rotation.inverse() * normal;
                     let point = real * nalgebra::Point3::from(robot.shapes[shape].convex.support(&local));
