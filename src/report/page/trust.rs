@@ -101,7 +101,7 @@ pub(super) fn section_of(inputs: &PageInputs<'_>) -> String {
     let mut svg = Svg::inline(WIDTH, height, "The tube from above", "tube");
     view.draw(&mut svg, Area { x: 0.0, y: 0.0, width: WIDTH, height });
     let body = format!(
-        "<p>{}</p>\n<p>{why} {verdict} Slip is not in it.</p>\n<figure>{}<figcaption>Where the base can be, every few rows.{note}</figcaption></figure>\n\
+        "<p>{}</p>\n<p>{why} {verdict} Slip is not in it.</p>\n<figure>{}<figcaption>Where the base can be, every few rows. Below: against the metres driven.{note}</figcaption></figure>\n\
          <div class=\"charts\">\n{}{}</div>\n",
         escape(&sentence(&summary::trust_text(part).replace('\u{a0}', " "))),
         svg.finish(),
