@@ -69,6 +69,7 @@ fn robot() -> RobotModel {
         ignore_pairs: ["left_blade", "right_blade"]
             .map(|blade| IgnoredPair { links: ["base".into(), blade.into()], reason: IgnoreReason::Joined })
             .into(),
+        tolerance: None,
     }
 }
 

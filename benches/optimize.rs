@@ -63,6 +63,7 @@ fn robot() -> RobotModel {
             min_speed: 0.01,
         },
         ignore_pairs: Vec::new(),
+        tolerance: None,
     }
 }
 

@@ -1,26 +1,28 @@
 //! `compile()`: every stage, in order. Read this file first.
 
+mod attempts;
 mod check;
 mod place;
 mod plan;
 mod stops;
 mod world;
 
+pub use attempts::OPTIMISER_MARGINS;
 pub use check::{check, path_error_of_commands};
 pub use place::Place;
-pub use plan::{OPTIMISER_MARGINS, SEARCH_MARGIN};
+pub use plan::SEARCH_MARGIN;
 pub use world::world;
 
 use std::time::Instant;
 
-use crate::certify::{self, Certificate, Goal, RefusalKind, Task, Via};
+use crate::certify::{self, Certificate, Goal, RefusalKind, Task, Trust, Via};
 use crate::command::{self, CommandTable, SampleOptions};
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::geom::{Pose2, wrap_angle};
 use crate::map::VoxelMap;
-use crate::mission::{Mission, Parameterisation, PathSpec, PoseSpec, TimeLaw};
+use crate::mission::{Mission, Parameterisation, PathSpec, PoseSpec, TimeLaw, Tolerance};
 use crate::report::schema::{InputFile, InputsPart};
-use crate::report::schema::{ProfilePart, TrajectoryPart};
+use crate::report::schema::{ProfilePart, TrajectoryPart, TrustPart};
 use crate::report::{Report, metrics, path_error};
 use crate::retime::{self, MotionProfile, RetimeOptions};
 use crate::robot::{Files, RobotModel, spec::RobotSpec};
@@ -79,13 +81,23 @@ pub struct CompileOptions {
     pub spins: bool,
     /// Also find the largest sampling time with which commands leave the path by no more than this, m. Default: no.
     pub max_error: Option<f64>,
+    /// Say how far the commands can be trusted without feedback, by a tolerance that is assumed where none is given. Default true.
+    pub trust: bool,
     /// Threads for the distance field of a large map; the result is the same with any number. Default 1.
     pub threads: usize,
 }
 
 impl Default for CompileOptions {
     fn default() -> Self {
-        Self { sampling_time: None, parameterisation: None, dense: true, spins: true, max_error: None, threads: 1 }
+        Self {
+            sampling_time: None,
+            parameterisation: None,
+            dense: true,
+            spins: true,
+            max_error: None,
+            trust: true,
+            threads: 1,
+        }
     }
 }
 
@@ -112,6 +124,8 @@ pub struct Traces {
     pub route: Vec<[f64; 2]>,
     /// Commands that the certificate refused.
     pub refused: Option<CommandTable>,
+    /// How far the commands, certified or refused, can be trusted; with the tube.
+    pub trust: Option<Trust>,
 }
 
 /// A certified motion.
@@ -248,6 +262,15 @@ fn stages(
     run.report.profile = Some(profile_part(&profile, &commands));
     run.report.commands = Some((&commands).into());
     run.report.judge(&certificate);
+    // With a tolerance in force, certified commands can be trusted to their end, and a refusal says where they cannot.
+    if options.trust && (certificate.holds() || robot.tolerance.is_some()) {
+        let tolerance = robot.tolerance.unwrap_or(Tolerance::ASSUMED);
+        let task = finish.task(&trajectory);
+        let map = map.as_deref();
+        let trust = run.stage("trust", || certify::trust(&commands, robot, map, &task, tolerance));
+        run.report.trust = trust.as_ref().map(|t| TrustPart::new(t, robot.tolerance.is_some(), map.is_some()));
+        run.traces.trust = trust;
+    }
     if !certificate.holds() {
         run.traces.refused = Some(commands);
         return Err(refused(&certificate, trajectory.source).into());
@@ -291,12 +314,22 @@ impl Finish<'_> {
 
     /// The same of a task that is not the mission's.
     fn certify_task(&self, run: &mut Run<'_>, trajectory: Trajectory, task: &Task) -> Result<Made, Diagnostics> {
-        let options = RetimeOptions { law: self.law(&trajectory), sampling_time: self.sampling_time };
-        let profile = run.stage("retime", || retime::retime(&trajectory, self.robot, &options))?;
-        let options = SampleOptions { sampling_time: self.sampling_time, sampling: self.mission.sampling };
-        let commands = run.stage("command", || command::sample(&profile, self.robot, &options))?;
+        let (profile, commands) = self.commands(run, &trajectory)?;
         let certificate = run.stage("certify", || certify::certify(&commands, self.robot, self.map, task));
         Ok(Made { trajectory, profile, commands, certificate })
+    }
+
+    /// A trajectory timed and sampled.
+    fn commands(
+        &self,
+        run: &mut Run<'_>,
+        trajectory: &Trajectory,
+    ) -> Result<(MotionProfile, CommandTable), Diagnostics> {
+        let options = RetimeOptions { law: self.law(trajectory), sampling_time: self.sampling_time };
+        let profile = run.stage("retime", || retime::retime(trajectory, self.robot, &options))?;
+        let options = SampleOptions { sampling_time: self.sampling_time, sampling: self.mission.sampling };
+        let commands = run.stage("command", || command::sample(&profile, self.robot, &options))?;
+        Ok((profile, commands))
     }
 
     /// The mission's time law, where it can time this trajectory.
@@ -454,8 +487,10 @@ fn given_path(
 fn refused(certificate: &Certificate, source: TrajectorySource) -> Diagnostic {
     let reasons: Vec<&str> = certificate.refusals.iter().map(|r| r.message.as_str()).collect();
     let too_close = certificate.refusals.iter().all(|r| r.kind == RefusalKind::Clearance);
+    let too_wide = certificate.refusals.iter().any(|r| r.kind == RefusalKind::Tolerance);
     let own_links = certificate.refusals.iter().any(|r| r.kind == RefusalKind::OwnLinks);
     let hint = match source {
+        _ if too_wide => return refused_for_tolerance(certificate, &reasons.join("; ")),
         _ if own_links => {
             "other joint values at start and goal may keep them apart; where shapes are drawn too large, name the pair in robot.yaml's \
              `collision: {ignore_pairs}`: `trajc robot init URDF` lists such pairs"
@@ -467,6 +502,39 @@ fn refused(certificate: &Certificate, source: TrajectorySource) -> Diagnostic {
         _ => "lower `clearance_m` or the speed limits, or shorten `sampling_time_s`",
     };
     Diagnostic::failure("certify/refused", format!("the certificate is refused: {}", reasons.join("; "))).hint(hint)
+}
+
+/// The message of a motion that the model's robot can drive, but not every robot within the tolerance.
+fn refused_for_tolerance(certificate: &Certificate, reasons: &str) -> Diagnostic {
+    let inside = certificate.tolerance.as_ref();
+    let shares = inside.and_then(|inside| inside.there).map(|(_, shares)| shares).unwrap_or_default();
+    let remedy = match shares.most().0 {
+        "latency_s" => "a controller that is less late, or slower joints (`limits`)",
+        "start_m" | "start_rad" => "a start that is set more exactly",
+        _ => "wheels and track that are calibrated, for a smaller `tolerance`",
+    };
+    let hint = format!(
+        "{remedy}; a shorter way between places where feedback sets the robot right; or a smaller `clearance_m`, which every robot \
+         within the tolerance keeps"
+    );
+    let mut fault =
+        Diagnostic::failure("certify/tolerance", format!("the certificate is refused: {reasons}")).hint(hint);
+    for (key, share) in shares.named() {
+        fault = fault.number(share_key(key), share);
+    }
+    fault
+}
+
+/// The name of a tolerance's share among a report's numbers.
+fn share_key(key: &str) -> &'static str {
+    match key {
+        "wheel_radius" => "share_wheel_radius_m",
+        "wheel_difference" => "share_wheel_difference_m",
+        "track" => "share_track_m",
+        "latency_s" => "share_latency_m",
+        "start_m" => "share_start_m",
+        _ => "share_start_heading_m",
+    }
 }
 
 fn profile_part(profile: &MotionProfile, commands: &CommandTable) -> ProfilePart {

@@ -101,11 +101,14 @@ impl Schema {
             "exclusiveMinimum" => number(|v, bound| v > bound),
             "minItems" | "minLength" => length(|own, bound| own >= bound),
             "maxItems" => length(|own, bound| own <= bound),
-            // There is one pattern: degrees.
+            // There are two patterns: degrees and percent.
             "pattern" => {
-                assert!(says.as_str().is_some_and(|p| p.ends_with("deg$")), "{says}");
-                let degrees = |text: &str| text.strip_suffix("deg").is_some_and(|n| n.parse::<f64>().is_ok());
-                value.as_str().is_none_or(degrees)
+                let unit = ["deg", "%"]
+                    .into_iter()
+                    .find(|unit| says.as_str().is_some_and(|p| p.ends_with(&format!("{unit}$"))));
+                let unit = unit.unwrap_or_else(|| panic!("{says}"));
+                let written = |text: &str| text.strip_suffix(unit).is_some_and(|n| n.parse::<f64>().is_ok());
+                value.as_str().is_none_or(written)
             }
             "required" => value.as_object().is_none_or(|object| {
                 says.as_array().expect("names").iter().all(|name| object.contains_key(name.as_str().expect("a name")))
@@ -164,6 +167,8 @@ fn reports_of_every_ending_are_what_the_schema_says() {
         ("certified", mission.clone(), 0),
         ("given", path.to_owned(), 0),
         ("joints", bars.to_owned(), 0),
+        ("tolerance", mission.clone() + "tolerance: {track: 1%, wheel_difference: 0.1%}\n", 0),
+        ("too_narrow", mission.clone() + "tolerance: {wheel_difference: 0.1}\n", 1),
         ("start_blocked", mission.replace("x_m: 0.6", "x_m: 2.0"), 1),
         ("goal_blocked", mission.replace("x_m: 3.4", "x_m: 2.0"), 1),
         ("off_the_map", mission.replace("x_m: 3.4", "x_m: 30"), 1),

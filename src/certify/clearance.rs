@@ -11,8 +11,9 @@ use super::distance::{Posed, nearest_along};
 use super::motion::{Kinematics, Moving, MovingShape};
 use super::obstacles::{Edge, Obstacles};
 use super::rollout::Rollout;
+use super::tube::{Shares, Tube, Width};
 use super::{Closest, Refusal, RefusalKind};
-use crate::geom::Aabb;
+use crate::geom::{Aabb, Pose2};
 use crate::map::VoxelMap;
 use crate::robot::RobotModel;
 
@@ -33,13 +34,25 @@ pub(super) struct Clearance {
     pub(super) proven: f64,
     /// The least distance found.
     pub(super) closest: Option<Closest>,
+    /// How wide the tube is where that is, and what each tolerance has to do with it; `None` without a tube.
+    pub(super) there: Option<(Width, Shares)>,
     /// Why it does not suffice.
     pub(super) refusal: Option<Refusal>,
 }
 
-/// Measures the clearance of a replay against a map. `required`: what is asked for, m; touching is never enough.
-pub(super) fn clearance(rollout: &Rollout<'_>, robot: &RobotModel, map: &VoxelMap, required: f64) -> Clearance {
-    let mut search = Search::new(rollout, robot, map, required.max(1e-9));
+/// More than nothing, m: touching is never enough.
+const LEAST: f64 = 1e-9;
+
+/// Measures the clearance of a replay against a map, or of all robots in a tube around it. `required`: what is asked for, m; touching is
+/// never enough.
+pub(super) fn clearance<'a>(
+    rollout: &'a Rollout<'a>,
+    robot: &'a RobotModel,
+    map: &'a VoxelMap,
+    required: f64,
+    tube: Option<&'a Tube<'a>>,
+) -> Clearance {
+    let mut search = Search::new(rollout, robot, map, required.max(LEAST), tube);
     for reach in REACHES {
         let reach = reach.max(search.required + 0.05);
         if reach > search.reach {
@@ -51,6 +64,23 @@ pub(super) fn clearance(rollout: &Rollout<'_>, robot: &RobotModel, map: &VoxelMa
         }
     }
     search.verdict(required)
+}
+
+/// The first row in which a robot in the tube may touch an obstacle; `None`: in none.
+pub(super) fn first_contact<'a>(
+    rollout: &'a Rollout<'a>,
+    robot: &'a RobotModel,
+    map: &'a VoxelMap,
+    tube: &'a Tube<'a>,
+) -> Option<usize> {
+    let mut search = Search::new(rollout, robot, map, LEAST, Some(tube));
+    search.reach = LEAST;
+    (0..rollout.rows()).find(|row| {
+        let (mut left, mut boxes) = (Vec::new(), Vec::new());
+        search.whole_row(*row, &mut left, &mut boxes);
+        search.halve(left, boxes);
+        search.least < LEAST || search.unproven < LEAST
+    })
 }
 
 /// A shape during a part of a row.
@@ -84,6 +114,7 @@ struct Search<'a> {
     robot: &'a RobotModel,
     kinematics: Kinematics<'a>,
     obstacles: Obstacles<'a>,
+    tube: Option<&'a Tube<'a>>,
     required: f64,
     /// Taken off every bound, m.
     rounding: f64,
@@ -102,7 +133,13 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(rollout: &'a Rollout<'a>, robot: &'a RobotModel, map: &'a VoxelMap, required: f64) -> Self {
+    fn new(
+        rollout: &'a Rollout<'a>,
+        robot: &'a RobotModel,
+        map: &'a VoxelMap,
+        required: f64,
+        tube: Option<&'a Tube<'a>>,
+    ) -> Self {
         let kinematics = Kinematics::new(robot);
         let mut extreme = vec![0.0f64; robot.joints.len()];
         for row in 0..rollout.rows() {
@@ -119,6 +156,7 @@ impl<'a> Search<'a> {
             robot,
             kinematics,
             obstacles: Obstacles::new(map),
+            tube,
             required,
             rounding,
             reach: 0.0,
@@ -151,6 +189,11 @@ impl<'a> Search<'a> {
         for row in 0..self.rollout.rows() {
             self.whole_row(row, &mut left, &mut boxes);
         }
+        self.halve(left, boxes);
+    }
+
+    /// Looks at the halves of intervals that are not proven, and so on.
+    fn halve(&mut self, mut left: Vec<Interval>, mut boxes: Vec<Aabb>) {
         let mut joints = Vec::new();
         let mut bodies = Vec::new();
         while !left.is_empty() {
@@ -196,7 +239,10 @@ impl<'a> Search<'a> {
         let pose = self.rollout.pose(row, half);
         for shape in 0..self.kinematics.shape_count() {
             let acceleration = self.kinematics.acceleration(shape, held, &joints);
-            let moving = self.kinematics.shape(shape, &bodies, pose, acceleration);
+            let mut moving = self.kinematics.shape(shape, &bodies, pose, acceleration);
+            if let Some(tube) = self.tube {
+                tube.loosen(shape, &mut moving, (row, half), half);
+            }
             let interval =
                 Interval { shape, row, tau: half, half, acceleration, lower: f64::NEG_INFINITY, boxes: (0, 0) };
             let margin = self.target().max(0.0) + self.rounding + moving.motion(half);
@@ -212,7 +258,11 @@ impl<'a> Search<'a> {
     fn shape_at(&self, at: Interval, joints: &mut Vec<f64>, bodies: &mut Vec<Moving>) -> MovingShape<'a> {
         self.rollout.joints_at(at.row, at.tau, joints);
         self.kinematics.bodies(joints, self.rollout.held(at.row), bodies);
-        self.kinematics.shape(at.shape, bodies, self.rollout.pose(at.row, at.tau), at.acceleration)
+        let mut shape = self.kinematics.shape(at.shape, bodies, self.rollout.pose(at.row, at.tau), at.acceleration);
+        if let Some(tube) = self.tube {
+            tube.loosen(at.shape, &mut shape, (at.row, at.tau), at.half);
+        }
+        shape
     }
 
     /// Notes a distance of two real points at a real instant.
@@ -347,33 +397,43 @@ impl<'a> Search<'a> {
     fn verdict(&self, required: f64) -> Clearance {
         let proven = self.target().min(self.unproven).max(0.0);
         let closest = self.witness.map(|witness| self.closest(witness));
+        let there = self.witness.zip(self.tube).map(|(at, tube)| self.width_and_shares(at, tube));
         let holds = self.least >= self.required && proven >= self.required;
+        let kind = if self.tube.is_some() { RefusalKind::Tolerance } else { RefusalKind::Clearance };
         let refusal = (!holds).then(|| {
             let Some(closest) = &closest else {
                 let message = format!("clearance of {required:.4} m could not be proven, only {proven:.4} m");
-                return Refusal { kind: RefusalKind::Clearance, message, time: None };
+                return Refusal { kind, message, time: None };
             };
-            let Closest { time, link, obstacle, distance } = closest;
-            let what = match obstacle {
-                None => "unseen space beyond the map".to_owned(),
-                Some(Aabb { min: a, max: b }) => format!(
-                    "the occupied cell [{:.3}, {:.3}] x [{:.3}, {:.3}] x [{:.3}, {:.3}]",
-                    a[0], b[0], a[1], b[1], a[2], b[2]
-                ),
+            let message = match &there {
+                None => too_near(closest, required, proven),
+                Some(there) => {
+                    let at = self.witness.map_or_else(Pose2::default, |at| self.rollout.pose(at.row, at.tau));
+                    too_wide(closest, at, required, there)
+                }
             };
-            let message = if *distance <= 0.0 {
-                format!("`{link}` is about {:.3} m deep in {what} at t = {time:.3} s", -distance)
-            } else if *distance < required {
-                format!("`{link}` comes within {distance:.4} m of {what} at t = {time:.3} s; {required:.4} m required")
-            } else {
-                format!(
-                    "clearance of {required:.6} m could not be proven, only {proven:.6} m: \
-                     `{link}` comes within {distance:.6} m of {what} at t = {time:.3} s"
-                )
-            };
-            Refusal { kind: RefusalKind::Clearance, message, time: Some(*time) }
+            Refusal { kind, message, time: Some(closest.time) }
         });
-        Clearance { proven, closest, refusal }
+        Clearance { proven, closest, there, refusal }
+    }
+
+    /// The tube at a witness: its width, and what brings the shape's point nearer there that is nearest to the obstacle.
+    fn width_and_shares(&self, at: Witness, tube: &Tube<'_>) -> (Width, Shares) {
+        let mut joints = Vec::new();
+        let mut bodies = Vec::new();
+        self.rollout.joints_at(at.row, at.tau, &mut joints);
+        self.kinematics.bodies(&joints, self.rollout.held(at.row), &mut bodies);
+        let posed = self.kinematics.shape(at.shape, &bodies, self.rollout.pose(at.row, at.tau), 0.0).posed;
+        let bounds = posed.bounds();
+        let sides = self.obstacles.edges.iter();
+        let side = sides.min_by(|a, b| beyond(a, &bounds).total_cmp(&beyond(b, &bounds)));
+        let toward = match &at.obstacle {
+            Some(obstacle) => posed.separation(obstacle).normal,
+            None => side.map(|edge| Vector3::ith(edge.axis, edge.sign)),
+        };
+        let toward = toward.unwrap_or_else(Vector3::zeros);
+        let point = posed.centre + posed.support(&toward);
+        (tube.width(at.row, at.tau), tube.shares((at.row, at.tau), at.shape, point.xy(), toward.xy()))
     }
 
     fn closest(&self, witness: Witness) -> Closest {
@@ -381,7 +441,10 @@ impl<'a> Search<'a> {
         self.rollout.joints_at(witness.row, witness.tau, &mut joints);
         self.kinematics.bodies(&joints, self.rollout.held(witness.row), &mut bodies);
         let pose = self.rollout.pose(witness.row, witness.tau);
-        let shape = self.kinematics.shape(witness.shape, &bodies, pose, 0.0);
+        let mut shape = self.kinematics.shape(witness.shape, &bodies, pose, 0.0);
+        if let Some(tube) = self.tube {
+            tube.loosen(witness.shape, &mut shape, (witness.row, witness.tau), 0.0);
+        }
         Closest {
             time: self.rollout.time(witness.row, witness.tau),
             link: self.robot.shapes[witness.shape].link.clone(),
@@ -404,6 +467,49 @@ impl<'a> Search<'a> {
             }
         }
         best.2
+    }
+}
+
+/// Why a motion's clearance does not suffice.
+fn too_near(closest: &Closest, required: f64, proven: f64) -> String {
+    let Closest { time, link, obstacle, distance } = closest;
+    let what = named(obstacle);
+    if *distance <= 0.0 {
+        format!("`{link}` is about {:.3} m deep in {what} at t = {time:.3} s", -distance)
+    } else if *distance < required {
+        format!("`{link}` comes within {distance:.4} m of {what} at t = {time:.3} s; {required:.4} m required")
+    } else {
+        format!(
+            "clearance of {required:.6} m could not be proven, only {proven:.6} m: \
+             `{link}` comes within {distance:.6} m of {what} at t = {time:.3} s"
+        )
+    }
+}
+
+/// Why a tube's clearance does not suffice: where, by how much, and which tolerance has most to do with it.
+fn too_wide(closest: &Closest, at: Pose2, required: f64, (width, shares): &(Width, Shares)) -> String {
+    let Closest { time, link, obstacle, distance } = closest;
+    let (key, most) = shares.most();
+    format!(
+        "too narrow for the tolerance by {:.4} m at t = {time:.3} s, the base at ({:.2}, {:.2}): {required:.4} m from {what} are required, and `{link}` may come {near}; \
+         the robot may be off by {:.4} m and {:.2} degrees there, and `{key}` brings it nearer most, by {most:.4} m",
+        required - distance,
+        at.x,
+        at.y,
+        width.distance,
+        width.angle.to_degrees(),
+        what = named(obstacle),
+        near = if *distance > 0.0 { format!("within {distance:.4} m") } else { "into it".to_owned() },
+    )
+}
+
+fn named(obstacle: &Option<Aabb>) -> String {
+    match obstacle {
+        None => "unseen space beyond the map".to_owned(),
+        Some(Aabb { min: a, max: b }) => format!(
+            "the occupied cell [{:.3}, {:.3}] x [{:.3}, {:.3}] x [{:.3}, {:.3}]",
+            a[0], b[0], a[1], b[1], a[2], b[2]
+        ),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Distance of a posed convex shape from an axis-aligned box or another shape, with a proof: a plane that separates them by at least as
 //! much.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::simplex::Simplex;
 use crate::geom::Aabb;
@@ -23,6 +23,47 @@ pub(super) struct Posed<'a> {
     pub(super) turn: Matrix3<f64>,
     /// The shape's centre in the map frame, m.
     pub(super) centre: Vector3<f64>,
+    /// Where its points can be besides; `None`: they are where they are.
+    pub(super) spread: Option<Spread>,
+}
+
+/// How far the points of a shape can be off: the shape turned a little about the vertical through its centre, then shifted by any sum of
+/// what follows. Hulls of all this are what distances are of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Spread {
+    /// By -1 to 1 times each of these, m, in the plane.
+    pub(super) along: [Vector2<f64>; 4],
+    /// The turn, rad, both ways; to first order, its points move along tangents.
+    pub(super) turn: f64,
+    /// By as much in any direction of the plane, m.
+    pub(super) disc: f64,
+    /// By as much in any direction, m.
+    pub(super) ball: f64,
+}
+
+impl Spread {
+    /// The greatest `d . shift`, times |d|.
+    pub(super) fn along(&self, d: &Vector3<f64>) -> f64 {
+        let flat = d.xy();
+        let shifts: f64 = self.along.iter().map(|v| v.dot(&flat).abs()).sum();
+        shifts + self.disc * flat.norm() + self.ball * d.norm()
+    }
+
+    /// The shift that is farthest along `d`.
+    fn farthest(&self, d: &Vector3<f64>) -> Vector3<f64> {
+        let flat = d.xy();
+        let signed = self.along.iter().map(|v| if v.dot(&flat) < 0.0 { -v } else { *v });
+        let disc = flat.try_normalize(1e-12).map_or_else(Vector2::zeros, |unit| unit * self.disc);
+        let planar = signed.sum::<Vector2<f64>>() + disc;
+        let ball = d.try_normalize(1e-300).map_or_else(Vector3::zeros, |unit| unit * self.ball);
+        Vector3::new(planar.x, planar.y, 0.0) + ball
+    }
+
+    /// `d` as the points see it that have turned one way and the other: `d . (p + m z x p) = turned . p`.
+    pub(super) fn turned(&self, d: &Vector3<f64>) -> [Vector3<f64>; 2] {
+        let across = Vector3::new(d.y, -d.x, 0.0) * self.turn;
+        [d + across, d - across]
+    }
 }
 
 /// What is known of a distance, in metres.
@@ -36,7 +77,15 @@ pub(super) struct Separation {
 
 impl Posed<'_> {
     /// How far the shape reaches from its centre along `d`: the greatest `d . (p - centre)` over its points p, times |d|.
+    /// With a spread, that of all places where they can be.
     pub(super) fn reach(&self, d: &Vector3<f64>) -> f64 {
+        let Some(spread) = &self.spread else { return self.own_reach(d) };
+        let [one, other] = spread.turned(d);
+        self.own_reach(&one).max(self.own_reach(&other)) + spread.along(d)
+    }
+
+    /// The same of the shape as it is.
+    pub(super) fn own_reach(&self, d: &Vector3<f64>) -> f64 {
         let local = self.turn.tr_mul(d);
         match self.convex {
             Convex::Box { half } => half[0] * local.x.abs() + half[1] * local.y.abs() + half[2] * local.z.abs(),
@@ -71,12 +120,21 @@ impl Posed<'_> {
         nearest_along(normal, obstacle, &self.centre) - self.reach(normal)
     }
 
+    /// The point that is farthest along `d`, from the centre.
+    pub(super) fn support(&self, d: &Vector3<f64>) -> Vector3<f64> {
+        let own = |d: &Vector3<f64>| self.turn * self.convex.support(&self.turn.tr_mul(d));
+        let Some(spread) = &self.spread else { return own(d) };
+        let [one, other] = spread.turned(d);
+        let (p, q) = (own(&one), own(&other));
+        let (p, turn) = if p.dot(&one) >= q.dot(&other) { (p, spread.turn) } else { (q, -spread.turn) };
+        p + Vector3::new(-p.y, p.x, 0.0) * turn + spread.farthest(d)
+    }
+
     /// The distance to a box, by Gilbert, Johnson and Keerthi's descent over the difference of the two bodies.
     pub(super) fn separation(&self, obstacle: &Aabb) -> Separation {
         // Points of the difference, seen from the box: shape minus box, in axes of the map, about the shape's centre.
         let corner = |away: &Vector3<f64>| {
-            let shape = self.turn * self.convex.support(&self.turn.tr_mul(away));
-            let mut corner = shape + self.centre;
+            let mut corner = self.support(away) + self.centre;
             for axis in 0..3 {
                 corner[axis] -= if away[axis] < 0.0 { obstacle.max[axis] } else { obstacle.min[axis] };
             }
@@ -95,8 +153,7 @@ impl Posed<'_> {
     /// The distance to another shape, found alike; the normal points to it.
     pub(super) fn separation_from(&self, other: &Posed<'_>) -> Separation {
         let between = self.centre - other.centre;
-        let farthest = |posed: &Posed<'_>, d: &Vector3<f64>| posed.turn * posed.convex.support(&posed.turn.tr_mul(d));
-        let corner = |away: &Vector3<f64>| farthest(self, away) - farthest(other, &-away) + between;
+        let corner = |away: &Vector3<f64>| self.support(away) - other.support(&-away) + between;
         descend(corner, if between.norm_squared() == 0.0 { Vector3::z() } else { -between })
     }
 
@@ -166,7 +223,7 @@ mod tests {
 
     fn posed<'a>(convex: &'a Convex, pose: &Isometry3<f64>) -> Posed<'a> {
         let turn = pose.rotation.to_rotation_matrix().into_inner();
-        Posed { convex, turn, centre: pose.translation.vector }
+        Posed { convex, turn, centre: pose.translation.vector, spread: None }
     }
 
     fn any_pose() -> impl Strategy<Value = Isometry3<f64>> {

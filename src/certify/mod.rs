@@ -14,14 +14,19 @@ mod simplex;
 mod table;
 #[cfg(test)]
 mod tests;
+mod trust;
+mod tube;
 mod vias;
 
 use rollout::Rollout;
 pub use series::{Instant, distances};
+pub use trust::{Trust, TubePoint, trust, tube_along};
+pub use tube::{Shares, Width};
 
 use crate::command::CommandTable;
 use crate::geom::{Aabb, Pose2};
 use crate::map::VoxelMap;
+use crate::mission::Tolerance;
 use crate::robot::RobotModel;
 
 /// Ends within this distance of the goal, m.
@@ -87,6 +92,8 @@ pub struct Certificate {
     pub clearance_proven: Option<f64>,
     /// Where the least clearance was met.
     pub closest: Option<Closest>,
+    /// What was proven of every robot within [`RobotModel::tolerance`]; `None`: the robot has none.
+    pub tolerance: Option<InTube>,
     /// The robot's links against each other; `None` where none that are checked move against each other.
     pub own_links: Option<OwnLinks>,
     /// m.
@@ -108,6 +115,21 @@ impl Certificate {
     pub fn holds(&self) -> bool {
         self.refusals.is_empty()
     }
+}
+
+/// What was proven of every robot within a tolerance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InTube {
+    /// How far robots may be off.
+    pub tolerance: Tolerance,
+    /// How far they may be off at the end.
+    pub end: Width,
+    /// Proven lower bound of their distance from obstacles, m; `None` without a map. Zero: nothing is proven.
+    pub clearance_proven: Option<f64>,
+    /// Where it is least; `distance`: of the robot that comes nearest, by the bounds that the proof rests on.
+    pub closest: Option<Closest>,
+    /// How wide the tube is there, and how much nearer each tolerance may bring the robot.
+    pub there: Option<(Width, Shares)>,
 }
 
 /// What was proven of the robot's links against each other.
@@ -135,6 +157,8 @@ pub struct Refusal {
 pub enum RefusalKind {
     /// Clearance not proven.
     Clearance,
+    /// Clearance not proven of every robot within the tolerance.
+    Tolerance,
     /// The robot's links touch each other.
     OwnLinks,
     /// Speed, acceleration or jerk.
@@ -188,7 +212,7 @@ pub fn clearance_proven(table: &CommandTable, robot: &RobotModel, map: &VoxelMap
         return 0.0;
     }
     let rollout = Rollout::new(table, task.start, &task.start_joints);
-    clearance::clearance(&rollout, robot, map, task.clearance).proven
+    clearance::clearance(&rollout, robot, map, task.clearance, None).proven
 }
 
 /// Judges a command table: replays it from the task's start and checks table, limits, ends, the robot's
@@ -212,6 +236,7 @@ pub fn certify_through(
         clearance_required: map.map(|_| task.clearance),
         clearance_proven: map.map(|_| 0.0),
         closest: None,
+        tolerance: None,
         own_links: None,
         end_point_error: f64::INFINITY,
         end_heading_error: task.goal.yaw.map(|_| f64::INFINITY),
@@ -250,10 +275,27 @@ pub fn certify_through(
     }
 
     if let Some(map) = map {
-        let clearance = clearance::clearance(&rollout, robot, map, task.clearance);
+        let clearance = clearance::clearance(&rollout, robot, map, task.clearance, None);
         certificate.clearance_proven = Some(clearance.proven);
         certificate.closest = clearance.closest;
         certificate.refusals.extend(clearance.refusal);
+    }
+    if let Some(tolerance) = robot.tolerance {
+        let tube = tube::Tube::new(&rollout, robot, tolerance);
+        let nominal = certificate.refusals.iter().any(|refusal| refusal.kind == RefusalKind::Clearance);
+        // What the model's own robot does not keep, no tube does.
+        let inside = map.map(|map| {
+            let required = if nominal { 0.0 } else { task.clearance };
+            clearance::clearance(&rollout, robot, map, required, Some(&tube))
+        });
+        let end = tube.width(rollout.rows() - 1, 0.0);
+        let mut proof = InTube { tolerance, end, clearance_proven: None, closest: None, there: None };
+        if let Some(inside) = inside {
+            proof.clearance_proven = Some(inside.proven);
+            (proof.closest, proof.there) = (inside.closest, inside.there);
+            certificate.refusals.extend(inside.refusal.filter(|_| !nominal));
+        }
+        certificate.tolerance = Some(proof);
     }
     certificate
 }

@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
-use super::distance::Posed;
+use super::distance::{Posed, Spread};
 use crate::geom::Pose2;
 use crate::robot::{Convex, RobotModel, Shape};
 
@@ -46,13 +46,15 @@ pub(super) struct MovingShape<'a> {
     acceleration: f64,
     /// Radius of the ball about the centre that holds the shape, m.
     pub(super) radius: f64,
+    /// How fast the shape's spread changes at most, m/s.
+    growth: f64,
 }
 
 impl MovingShape<'_> {
     /// No point gets farther than this from where it is within `half` seconds before or after, m.
     pub(super) fn motion(&self, half: f64) -> f64 {
         let fastest = self.velocity.norm() + self.spin.norm() * self.radius;
-        half * (fastest + 0.5 * half * self.acceleration)
+        half * (fastest + self.growth + 0.5 * half * self.acceleration)
     }
 
     /// How far the shape reaches along the unit vector `normal` from where its centre is now, at any instant up to `half`
@@ -66,7 +68,26 @@ impl MovingShape<'_> {
     /// Convex in `tau`.
     fn reach_after(&self, normal: &Vector3<f64>, tau: f64) -> f64 {
         let turned = normal + normal.cross(&self.spin) * tau;
-        tau * normal.dot(&self.velocity) + self.posed.reach(&turned) + 0.5 * tau * tau * self.acceleration
+        let reach = match &self.posed.spread {
+            None => self.posed.own_reach(&turned),
+            Some(spread) => {
+                let [one, other] = spread.turned(normal).map(|d| self.posed.own_reach(&(d + turned - normal)));
+                one.max(other) + spread.along(normal) + tau.abs() * self.growth
+            }
+        };
+        tau * normal.dot(&self.velocity) + reach + 0.5 * tau * tau * self.acceleration
+    }
+
+    /// How fast the shape's centre moves, and how fast any point moves against the centre, within `half` seconds before or after, at most, m/s.
+    pub(super) fn fastest(&self, half: f64) -> [f64; 2] {
+        let gained = half * self.acceleration;
+        [self.velocity.norm() + gained, self.spin.norm() * self.radius + 2.0 * gained]
+    }
+
+    /// Lets the shape's points be off: as far as `spread` says now, farther by `growth` (m/s) before and after.
+    pub(super) fn loosen(&mut self, spread: Spread, growth: f64) {
+        self.posed.spread = Some(spread);
+        self.growth = growth;
     }
 
     /// How far this shape along the unit vector `normal`, and `other` against it, reach together from where their centres are now, at any
@@ -167,11 +188,13 @@ impl<'a> Kinematics<'a> {
                 convex: &self.robot.shapes[shape].convex,
                 turn: map * body.turn * facts.turn,
                 centre: map * centre + Vector3::new(pose.x, pose.y, 0.0),
+                spread: None,
             },
             velocity: map * (body.drift + body.spin.cross(&centre)),
             spin: map * body.spin,
             acceleration,
             radius: facts.radius,
+            growth: 0.0,
         }
     }
 

@@ -5,4 +5,5 @@ mod faults;
 mod own_links;
 pub(crate) mod peer;
 pub(crate) mod robots;
+mod tube;
 mod vias;

@@ -184,7 +184,7 @@ fn of_mission(
     if !args.sampling_times.is_empty() {
         inputs.mission.path_error_times.clone_from(&args.sampling_times);
     }
-    let options = CompileOptions { max_error: args.max_error, ..CompileOptions::default() };
+    let options = CompileOptions { max_error: args.max_error, trust: false, ..CompileOptions::default() };
     let progress = terminal.progress(&inputs.mission.name.clone());
     let outcome = pipeline::compile(inputs, &options, &mut |stage| progress.stage(stage));
     match outcome.diagnostics {

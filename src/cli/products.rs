@@ -144,6 +144,7 @@ impl Products<'_> {
             commands: outcome.compiled.as_ref().map(|c| &c.commands).or(outcome.traces.refused.as_ref()),
             ends: [mission.start.as_ref(), mission.goal.as_ref()],
             route: &outcome.traces.route,
+            trust: outcome.traces.trust.as_ref(),
         };
         match args.report {
             ReportKind::Html => Some(("report.html", page::html(&page).into_bytes())),

@@ -7,6 +7,9 @@ use super::shape::{Bounds, Field, LARGE, Shape};
 /// What a number in degrees looks like.
 const DEGREES: &str = r"^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?deg$";
 
+/// What a number in percent looks like.
+const PERCENT: &str = r"^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?%$";
+
 /// The schema of a file with these keys. `extra` are further keywords for the root, such as `anyOf`.
 pub fn document(title: &str, description: &str, table: &'static [Field], extra: &[(&str, Value)]) -> Value {
     let mut root = Map::new();
@@ -46,6 +49,7 @@ fn of(shape: &'static Shape) -> Map<String, Value> {
         Shape::Flag => json!({"type": "boolean"}),
         Shape::Number(bounds) => number(bounds),
         Shape::Angle(bounds) => json!({"anyOf": [number(bounds), {"type": "string", "pattern": DEGREES}]}),
+        Shape::Share(bounds) => json!({"anyOf": [number(bounds), {"type": "string", "pattern": PERCENT}]}),
         Shape::Choice(choices) => {
             let words: Vec<&str> = choices.iter().filter(|c| c.later.is_none()).map(|c| c.word).collect();
             json!({"enum": words})

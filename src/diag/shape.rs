@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::words::{found, how_many, one_of, range_words, shorten, spelling, words, written};
-use super::yaml::{Entry, Node, Value, degrees};
+use super::yaml::{Entry, Node, Value, degrees, percent};
 use super::{Diagnostic, Source, Span, nearest};
 
 /// A key of a table.
@@ -46,6 +46,8 @@ pub enum Shape {
     Number(Bounds),
     /// The same, or degrees: `90deg`.
     Angle(Bounds),
+    /// A finite number within bounds, or the same in percent: `0.2%`.
+    Share(Bounds),
     /// One of these words.
     Choice(&'static [Choice]),
     /// A list.
@@ -224,6 +226,13 @@ impl Checker<'_> {
                 Value::Text(text) if degrees(text).is_some() => {
                     let angle = degrees(text).map_or(f64::NAN, f64::to_radians);
                     self.number(node, angle, bounds, field, path);
+                }
+                _ => self.wrong(node, field, shape, path),
+            },
+            Shape::Share(bounds) => match &node.value {
+                Value::Number(number) => self.number(node, *number, bounds, field, path),
+                Value::Text(text) if percent(text).is_some() => {
+                    self.number(node, percent(text).unwrap_or(f64::NAN), bounds, field, path);
                 }
                 _ => self.wrong(node, field, shape, path),
             },

@@ -12,6 +12,7 @@ pub(super) fn words(shape: &Shape) -> String {
         Shape::Flag => "`true` or `false`".into(),
         Shape::Number(bounds) => format!("a number{}", unit(bounds)),
         Shape::Angle(bounds) => format!("a number{} or degrees such as `90deg`", unit(bounds)),
+        Shape::Share(_) => "a share: a number, or percent such as `0.2%`".into(),
         Shape::Choice(choices) => {
             one_of(&choices.iter().filter(|c| c.later.is_none()).map(|c| c.word).collect::<Vec<_>>())
         }
@@ -94,7 +95,7 @@ pub(super) fn spelling(text: &str, shape: &Shape) -> Option<String> {
     let text = text.trim();
     let angle = match shape {
         Shape::Angle(_) => true,
-        Shape::Number(_) => false,
+        Shape::Number(_) | Shape::Share(_) => false,
         Shape::Flag => {
             let meant = match text.to_ascii_lowercase().as_str() {
                 "yes" | "on" | "y" | "true" | "1" => "true",
@@ -119,6 +120,7 @@ pub(super) fn spelling(text: &str, shape: &Shape) -> Option<String> {
     let number = plain_number(digits)?;
     Some(match unit {
         "deg" | "°" | "degrees" | "degree" | "Deg" | "DEG" if angle => format!("write `{digits}deg`, without a space"),
+        "%" if matches!(shape, Shape::Share(_)) => format!("write `{digits}%`, without a space"),
         "deg" | "°" | "degrees" | "degree" => {
             format!("no degrees here; in radians it is `{:.6}`", number.to_radians())
         }

@@ -107,6 +107,14 @@ impl Node {
         }
     }
 
+    /// A finite number, or finite percent (`0.2%`) as the share that they are.
+    pub fn share(&self) -> Option<f64> {
+        match &self.value {
+            Value::Text(text) => percent(text).filter(|share| share.is_finite()),
+            _ => self.number(),
+        }
+    }
+
     /// `true` or `false`.
     pub fn flag(&self) -> Option<bool> {
         match self.value {
@@ -119,6 +127,11 @@ impl Node {
 /// The number of `90deg`, in degrees.
 pub(super) fn degrees(text: &str) -> Option<f64> {
     plain_number(text.strip_suffix("deg")?)
+}
+
+/// The share that a text such as `0.2%` says.
+pub(super) fn percent(text: &str) -> Option<f64> {
+    plain_number(text.strip_suffix('%')?).map(|percent| percent / 100.0)
 }
 
 /// A decimal number and nothing else. (`f64::from_str` alone would take `inf` and `nan`.)

@@ -20,6 +20,7 @@ pub use interpolate::least_of_points;
 
 /// Signed Euclidean distance at the corners of the map's cells, m. Node (i, j, k) lies at
 /// `origin + resolution * (i, j, k)`; there are `dims + 1` nodes along each axis of the map.
+#[derive(Clone)]
 pub struct Esdf {
     pub(crate) resolution: f64,
     inverse_resolution: f64,
@@ -63,6 +64,20 @@ impl Esdf {
     /// Side of a cell, m.
     pub fn resolution(&self) -> f64 {
         self.resolution
+    }
+
+    /// The same field with every distance less by what `by` says of its place in x and y, m: obstacles that count as nearer there.
+    #[must_use]
+    pub fn lowered(&self, by: impl Fn([f64; 2]) -> f64) -> Self {
+        let mut out = self.clone();
+        let along_z = self.nodes[2].max(1);
+        for (column, values) in out.values.chunks_exact_mut(along_z).enumerate() {
+            let [i, j] = [column / self.nodes[1], column % self.nodes[1]];
+            let place = [(0, i), (1, j)].map(|(axis, k)| self.origin[axis] + self.resolution * k as f64);
+            let less = by(place) as f32;
+            values.iter_mut().for_each(|value| *value -= less);
+        }
+        out
     }
 
     /// Value at a node: exact distance, m.

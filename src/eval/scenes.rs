@@ -70,6 +70,7 @@ impl SceneSet {
             path_error_times: Vec::new(),
             path_error_samplings: Vec::new(),
             limits: self.limits.clone(),
+            tolerance: None,
             source: Default::default(),
             spans: Default::default(),
         }

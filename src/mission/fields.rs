@@ -8,7 +8,7 @@ pub(super) const METRES: Shape = Shape::Number(Bounds::any("m"));
 const SAMPLING_TIME: Shape = Shape::Number(Bounds::between(1e-4, 10.0, "s"));
 
 /// The keys of a mission file.
-pub(super) static MISSION: [Field; 14] = [
+pub(super) static MISSION: [Field; 15] = [
     Field::required(
         "robot",
         Shape::Text,
@@ -88,6 +88,12 @@ pub(super) static MISSION: [Field; 14] = [
         Shape::Table(&super::limits::FIELDS),
         "{wheel: {acceleration_mps2: 0.2}}",
         "limits that win over the robot's, key by key",
+    ),
+    Field::optional(
+        "tolerance",
+        Shape::Table(&super::tolerance::FIELDS),
+        "{wheel_radius: 0.2%, wheel_difference: 0.1%, track: 1%, latency_s: 0.02, start_m: 0.01, start_rad: 0.01}",
+        "how far the real robot may be off: clearance is then proven for every such robot; wins over the robot's, key by key",
     ),
     Field::optional("path", Shape::Table(&PATH), "{file: path.csv}", "a given path instead of `map` and `goal`"),
 ];

@@ -4,6 +4,7 @@ mod fields;
 pub(crate) mod limits;
 mod read;
 mod solids;
+pub(crate) mod tolerance;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -12,6 +13,7 @@ use std::sync::Arc;
 use crate::diag::{Diagnostics, Source, Span, json_schema};
 use crate::geom::Aabb;
 pub use solids::KeepOut;
+pub use tolerance::Tolerance;
 
 /// A mission, as written plus defaults. File names are as written, relative to the mission's folder.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,6 +50,8 @@ pub struct Mission {
     pub path_error_samplings: Vec<Sampling>,
     /// Overrides of the robot's limits.
     pub limits: LimitsSpec,
+    /// How far the robot may be off its model, as far as the mission says; wins over the robot's, key by key.
+    pub tolerance: Option<ToleranceSpec>,
     /// The text it was read from.
     pub source: Arc<Source>,
     /// Where in the text things are written.
@@ -274,6 +278,23 @@ pub struct BaseLimitsSpec {
     pub eta: Option<f64>,
     /// m/s.
     pub min_speed: Option<f64>,
+}
+
+/// `tolerance:` as written; each key optional. What it means: [`Tolerance`].
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ToleranceSpec {
+    /// A share.
+    pub wheel_radius: Option<f64>,
+    /// A share.
+    pub wheel_difference: Option<f64>,
+    /// A share.
+    pub track: Option<f64>,
+    /// s.
+    pub latency: Option<f64>,
+    /// m.
+    pub start_distance: Option<f64>,
+    /// rad.
+    pub start_angle: Option<f64>,
 }
 
 /// Reads a mission. `name` is the file's path as the user knows it (its stem becomes the mission's name).

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::fields::{MISSION, PARAMETERISATIONS, PATH, POSE, SAMPLING_LAWS, TIME_LAWS};
 use super::{
     MapSpec, Mission, MissionSpans, NamedJoint, Parameterisation, PathSpec, PoseSpec, Sampling, TimeLaw, Unknown,
-    ViaSpec, limits, solids,
+    ViaSpec, limits, solids, tolerance,
 };
 use crate::diag::shape::Field;
 use crate::diag::yaml::{Entry, Node};
@@ -52,6 +52,7 @@ pub(super) fn parse(name: &str, text: &str) -> Result<Mission, Diagnostics> {
         path_error_times: path_error_times(&root),
         path_error_samplings: vec![sampling],
         limits: limits::read(root.get("limits")),
+        tolerance: tolerance::read(root.get("tolerance")),
         spans: spans(&source, &root),
         source,
     })

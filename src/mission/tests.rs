@@ -30,6 +30,7 @@ limits:
   wheel: {speed_mps: 1, acceleration_mps2: 2, jerk_mps3: 3}
   joints: {blade: {lower: 10deg, upper: 2.0, speed: 4, acceleration: 5, jerk: 6}}
   base: {speed_mps: 7, acceleration_mps2: 8, angular_speed_radps: 9, angular_acceleration_radps2: 10, eta: 0.5, min_speed_mps: 0.02}
+tolerance: {wheel_radius: 1%, wheel_difference: 0.02, track: 3%, latency_s: 0.04, start_m: 0.05, start_rad: 6deg}
 path: {bezier: [[[0, 0], [2, 0], [4, 2], [4, 4]], [[4, 4], [4, 5], [4, 6], [4, 7]]]}
 ";
 

@@ -16,6 +16,7 @@ pub mod objective;
 mod options;
 pub mod penalty;
 mod sections;
+pub mod slack;
 pub mod steer;
 #[cfg(test)]
 pub(crate) mod test_robot;
@@ -40,9 +41,9 @@ pub fn optimize(path: &SearchPath, esdf: &Esdf, robot: &RobotModel, options: &Op
 
 /// Smooths a path, going on from a trajectory that [`optimize`] made of it and that was refused: with other options, but not from the
 /// beginning. Takes the polynomials of heading and arc length alone; from another trajectory it is [`optimize`].
-pub fn resume(
+pub fn resume<F: DistanceField>(
     path: &SearchPath,
-    esdf: &Esdf,
+    field: &F,
     robot: &RobotModel,
     options: &OptimizeOptions,
     refused: &Trajectory,
@@ -52,8 +53,8 @@ pub fn resume(
         _ => None,
     };
     match options.parameterisation {
-        Parameterisation::Flat => optimize_flat(path, esdf, robot, options),
-        Parameterisation::ArcLength => steer::optimize_steered(path, esdf, robot, options, from),
+        Parameterisation::Flat => optimize_flat(path, field, robot, options),
+        Parameterisation::ArcLength => steer::optimize_steered(path, field, robot, options, from),
     }
 }
 

@@ -182,6 +182,7 @@ pub fn robot(joints: usize) -> RobotModel {
             ["wheel", "mast"],
             ["blade", "mast"],
         ]),
+        tolerance: None,
     }
 }
 

@@ -1,11 +1,11 @@
 //! Searching and optimising until something is certified.
 
+use super::attempts::{Attempts, Tries, slacks};
 use super::{CompileOptions, Finish, Made, Place, Run, stops};
-use crate::certify::Task;
+use crate::certify::RefusalKind;
 use crate::diag::{Describe, Diagnostics};
 use crate::geom::Pose2;
-use crate::mission::{Mission, Parameterisation, PoseSpec};
-use crate::optimize::{self, OptimizeOptions};
+use crate::mission::{Mission, PoseSpec};
 use crate::report::metrics;
 use crate::report::schema::{InitialPart, SearchPart};
 use crate::robot::RobotModel;
@@ -14,65 +14,6 @@ use crate::trajectory::Trajectory;
 
 /// Clearance beyond what must be certified that the search asks for first, m: what held commands may leave of a path.
 pub const SEARCH_MARGIN: f64 = 2e-3;
-/// Clearance beyond what must be certified that the optimiser aims at, m, one try after the other.
-pub const OPTIMISER_MARGINS: [f64; 3] = [0.01, 0.02, 0.04];
-/// The same at first where the optimiser looks at a motion only now and then.
-const FIRST_MARGIN: f64 = 0.013;
-
-/// What a motion has missed of its clearance is asked for so many times over by the next tries: between its nodes the distance field
-/// says up to a quarter of a cell too much.
-const MISSED_TIMES: f64 = 1.5;
-/// What counts of it at most, m.
-const MISSED_MOST: f64 = 0.015;
-/// Distance below which a motion runs through an obstacle rather than too near it, m.
-const DEEP: f64 = -0.05;
-
-/// Which tries of the optimiser.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Tries {
-    /// Those that mostly succeed.
-    Soon,
-    /// The others.
-    Late,
-    All,
-}
-
-/// How many mostly succeed.
-const SOON: usize = 3;
-
-impl Tries {
-    /// Of a parameterisation that is asked for: what to optimise, with how much margin (m), and how.
-    fn of(self, asked: Parameterisation) -> Vec<(Parameterisation, f64, Look)> {
-        // Where one parameterisation fails at every margin, the other may not.
-        let other = (asked == Parameterisation::ArcLength).then_some(Parameterisation::Flat);
-        // A motion that misses its clearance by little is looked at more closely, then from the beginning, then asked for more.
-        let of = |p: Parameterisation| match p {
-            Parameterisation::Flat => OPTIMISER_MARGINS.map(|margin| (p, margin, Look::First)).to_vec(),
-            Parameterisation::ArcLength => {
-                let closer = OPTIMISER_MARGINS.map(|margin| (p, margin, Look::Closer));
-                [(p, FIRST_MARGIN, Look::First), (p, FIRST_MARGIN, Look::Again)].into_iter().chain(closer).collect()
-            }
-        };
-        let mut all: Vec<_> = [asked].into_iter().chain(other).flat_map(of).collect();
-        let late = all.split_off(SOON.min(all.len()));
-        match self {
-            Self::Soon => all,
-            Self::Late => late,
-            Self::All => [all, late].concat(),
-        }
-    }
-}
-
-/// How a try of the optimiser goes about it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Look {
-    /// From the path.
-    First,
-    /// More closely, from the motion of the try before.
-    Again,
-    /// More closely, from the path.
-    Closer,
-}
 
 /// Searches and optimises until something is certified; the search's own path is the last try. With vias: from stop to stop.
 pub(super) fn plan(
@@ -81,7 +22,6 @@ pub(super) fn plan(
     map: &Place,
     compile: &CompileOptions,
 ) -> Result<Made, Diagnostics> {
-    map.has_room()?;
     if !finish.mission.via.is_empty() {
         return stops::plan(run, finish, map, compile);
     }
@@ -89,26 +29,77 @@ pub(super) fn plan(
     let path = route(run, finish, map, compile, &query).map_err(|error| place_search_error(finish.mission, &error))?;
     note(run, &path, finish.robot);
     let task = |trajectory: &Trajectory| finish.task(trajectory);
+    let attempts = Attempts { finish, map, compile, task: &task, since: None };
+    let (made, path) = motion(run, &attempts, path, &query)?;
+    note(run, &path, finish.robot);
+    if !made.certificate.holds()
+        && let Some(wider) = wider_route(run, finish, map, compile, &query, &made)
+        && let Ok(again) = attempts.optimise(run, &wider)
+        && again.certificate.holds()
+    {
+        note(run, &wider, finish.robot);
+        return Ok(again);
+    }
+    Ok(made)
+}
+
+/// The motion along a path, and the path. Where the first tries are refused it may be another path, by more postures: between those
+/// that were sampled something may have been in the way.
+pub(super) fn motion(
+    run: &mut Run<'_>,
+    attempts: &Attempts<'_>,
+    path: SearchPath,
+    query: &Query,
+) -> Result<(Made, SearchPath), Diagnostics> {
+    let Attempts { finish, map, compile, .. } = attempts;
     if !search::has_more_postures(finish.robot) {
-        return optimise(run, finish, map, compile, &path, &task);
+        return attempts.optimise(run, &path).map(|made| (made, path));
     }
-    if let Some(made) = attempt(run, finish, map, compile, &path, Tries::Soon, &task) {
-        return Ok(made);
-    }
-    // Between the postures that were sampled something may have been in the way: another path leads by others.
+    let first = match attempts.run(run, &path, Tries::Soon) {
+        Ok(made) => return Ok((made, path)),
+        Err(nearest) => nearest,
+    };
     let field = map.field(compile.threads);
     let options = search_options(finish.mission, SEARCH_MARGIN);
-    let other = run.stage("search", || search::with_more_postures(map, field, finish.robot, &query, &options));
+    let other = run.stage("search", || search::with_more_postures(map, field, finish.robot, query, &options));
     if let Some(other) = other
-        && let Some(made) = attempt(run, finish, map, compile, &other, Tries::Soon, &task)
+        && let Ok(made) = attempts.run(run, &other, Tries::Soon)
     {
-        note(run, &other, finish.robot);
-        return Ok(made);
+        return Ok((made, other));
     }
-    if let Some(made) = attempt(run, finish, map, compile, &path, Tries::Late, &task) {
-        return Ok(made);
+    let made = match attempts.run(run, &path, Tries::Late) {
+        Ok(made) => made,
+        Err(nearest) => attempts.as_searched(run, &path, nearest.or(first))?,
+    };
+    Ok((made, path))
+}
+
+/// Another path, where that of a refused motion was too narrow for the tolerance alone: what the robot may be off there comes off every
+/// distance beside it. `None`: there is none, or the tolerance was not the reason.
+fn wider_route(
+    run: &mut Run<'_>,
+    finish: &Finish<'_>,
+    map: &Place,
+    compile: &CompileOptions,
+    query: &Query,
+    refused: &Made,
+) -> Option<SearchPath> {
+    let tolerance = finish.robot.tolerance.filter(|_| refused.only_the_tolerance_refuses())?;
+    let task = finish.task(&refused.trajectory);
+    let slacks = slacks(&refused.commands, finish.robot, &task, tolerance, 0)?;
+    let field = map.field(compile.threads);
+    run.stage("search", || {
+        let lowered = field.lowered(|place| slacks.aside(place));
+        search::search(map, &lowered, finish.robot, query, &search_options(finish.mission, SEARCH_MARGIN)).ok()
+    })
+}
+
+impl Made {
+    /// Whether the certificate refuses nothing but that every robot within the tolerance fits.
+    pub(super) fn only_the_tolerance_refuses(&self) -> bool {
+        let refusals = &self.certificate.refusals;
+        !refusals.is_empty() && refusals.iter().all(|refusal| refusal.kind == RefusalKind::Tolerance)
     }
-    as_searched(run, finish, &path, &task)
 }
 
 fn search_options(mission: &Mission, margin: f64) -> SearchOptions {
@@ -140,82 +131,6 @@ pub(super) fn note(run: &mut Run<'_>, path: &SearchPath, robot: &RobotModel) {
     run.report.search = Some(SearchPart::from(path));
     run.traces.route = path.states.iter().map(|state| [state.pose.x, state.pose.y]).collect();
     run.report.initial = Some(InitialPart { metrics: metrics::of_search(path, robot) });
-}
-
-/// The motion along a path that is certified to do its task; if none is, the path's own, and why it is refused.
-pub(super) fn optimise(
-    run: &mut Run<'_>,
-    finish: &Finish<'_>,
-    map: &Place,
-    compile: &CompileOptions,
-    path: &SearchPath,
-    task: &dyn Fn(&Trajectory) -> Task,
-) -> Result<Made, Diagnostics> {
-    match attempt(run, finish, map, compile, path, Tries::All, task) {
-        Some(made) => Ok(made),
-        None => as_searched(run, finish, path, task),
-    }
-}
-
-/// The path's own motion.
-fn as_searched(
-    run: &mut Run<'_>,
-    finish: &Finish<'_>,
-    path: &SearchPath,
-    task: &dyn Fn(&Trajectory) -> Task,
-) -> Result<Made, Diagnostics> {
-    let trajectory = path.trajectory();
-    let task = task(&trajectory);
-    finish.certify_task(run, trajectory, &task)
-}
-
-/// The first motion along a path that is certified to do its task.
-fn attempt(
-    run: &mut Run<'_>,
-    finish: &Finish<'_>,
-    map: &Place,
-    compile: &CompileOptions,
-    path: &SearchPath,
-    which: Tries,
-    task: &dyn Fn(&Trajectory) -> Task,
-) -> Option<Made> {
-    if path.length() == 0.0 {
-        return None;
-    }
-    let (mission, robot) = (finish.mission, finish.robot);
-    let field = map.field(compile.threads);
-    let mut refused: Option<Trajectory> = None;
-    let (mut missed, mut deep) = (0.0f64, false);
-    for (parameterisation, margin, look) in which.of(compile.parameterisation.unwrap_or(mission.parameterisation)) {
-        // A motion on the wrong side of something stays there.
-        if deep && look == Look::Again {
-            continue;
-        }
-        let usual = if compile.spins { OptimizeOptions::default() } else { OptimizeOptions::without_spins() };
-        let clearance = mission.clearance + margin;
-        let mut options = OptimizeOptions { parameterisation, clearance, dense: compile.dense, ..usual };
-        if look != Look::First {
-            options.steer = options.steer.closer();
-            options.clearance += MISSED_TIMES * missed;
-        }
-        let trajectory = run.stage("optimize", || match refused.take().filter(|_| look == Look::Again) {
-            Some(refused) => optimize::resume(path, field, robot, &options, &refused),
-            None => optimize::optimize(path, field, robot, &options),
-        });
-        refused = Some(trajectory.clone());
-        let task = task(&trajectory);
-        let made = finish.certify_task(run, trajectory, &task);
-        // A trajectory that no law can time is one more reason to go on to the next try.
-        let Ok(made) = made else { continue };
-        if made.certificate.holds() {
-            return Some(made);
-        }
-        if let Some(closest) = &made.certificate.closest {
-            missed = missed.max((mission.clearance - closest.distance).clamp(0.0, MISSED_MOST));
-            deep = closest.distance < DEEP;
-        }
-    }
-    None
 }
 
 /// What the search is asked.

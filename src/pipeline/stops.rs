@@ -1,6 +1,7 @@
 //! Missions with stops on the way: stretch by stretch from rest to rest, joined, and proven as one.
 
-use super::plan::{note, optimise, route};
+use super::attempts::{Attempts, Since};
+use super::plan::{motion, note, route};
 use super::{CompileOptions, Finish, Made, Place, Run, place_of, refused, start_of, vias};
 use crate::certify::{self, Task};
 use crate::command::{CommandError, CommandTable, MOST_ROWS};
@@ -48,15 +49,19 @@ pub(super) fn plan(
             let about = if error.is_about_start() { index } else { index + 1 };
             of_stretch(finish, index, about, error.diagnostic().into())
         })?;
-        let so_far = joined_paths(route_so_far.take(), &path);
-        note(run, &so_far, robot);
-        route_so_far = Some(so_far);
-        let made = optimise(run, finish, map, compile, &path, &|trajectory| {
+        note(run, &joined_paths(route_so_far.clone(), &path), robot);
+        let since = since(mission, &stretches);
+        let task = |trajectory: &Trajectory| {
             let (start, start_joints) = start_of(trajectory);
             let goal = place_of(place, robot);
             Task { start, start_joints, goal, clearance: mission.clearance, reverse: mission.reverse }
-        });
-        let made = made.map_err(|faults| of_stretch(finish, index, index + 1, faults))?;
+        };
+        let attempts = Attempts { finish, map, compile, task: &task, since: since.as_ref() };
+        let (made, path) =
+            motion(run, &attempts, path, &query).map_err(|faults| of_stretch(finish, index, index + 1, faults))?;
+        let so_far = joined_paths(route_so_far.take(), &path);
+        note(run, &so_far, robot);
+        route_so_far = Some(so_far);
         if !made.certificate.holds() {
             let why = refused(&made.certificate, made.trajectory.source);
             run.traces.refused = Some(made.commands);
@@ -77,6 +82,13 @@ pub(super) fn plan(
     let stops = vias(mission, robot);
     let certificate = run.stage("certify", || certify::certify_through(&commands, robot, finish.map, &task, &stops));
     Ok(Made { trajectory, profile, commands, certificate })
+}
+
+/// What the next stretch has behind it.
+fn since(mission: &Mission, stretches: &[(Made, bool)]) -> Option<Since> {
+    let (first, _) = stretches.first()?;
+    let commands = joined_commands(mission, stretches.iter().map(|(made, _)| &made.commands)).ok()?;
+    Some(Since { start: start_of(&first.trajectory), commands })
 }
 
 fn pose(place: &PoseSpec, otherwise: f64) -> Pose2 {

@@ -3,7 +3,7 @@
 use super::{Inputs, World};
 use crate::diag::{Diagnostic, Diagnostics, Span, nearest};
 use crate::map::{self, MapInputs};
-use crate::mission::Mission;
+use crate::mission::{Mission, ToleranceSpec};
 use crate::robot::{self, RobotInputs, RobotModel};
 
 /// The robot and the map, checked against what the mission says of them.
@@ -12,12 +12,13 @@ use crate::robot::{self, RobotInputs, RobotModel};
 /// All faults found.
 pub fn world(inputs: &mut Inputs) -> Result<World, Diagnostics> {
     let mission = &inputs.mission;
-    let robot = robot::parse(RobotInputs {
+    let mut robot = robot::parse(RobotInputs {
         spec: &inputs.robot_spec,
         urdf: (&inputs.urdf.name, &inputs.urdf.text),
         files: inputs.files.as_mut(),
         overrides: &mission.limits,
     })?;
+    robot.tolerance = ToleranceSpec::resolved(mission.tolerance, inputs.robot_spec.tolerance);
     let faults = unknown_joints(mission, &robot);
     if !faults.is_empty() {
         return Err(Diagnostics(faults));

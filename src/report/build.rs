@@ -4,7 +4,7 @@ use serde_json::{Map, Value, json};
 
 use super::schema::*;
 use super::{Metrics, Report, Status, names};
-use crate::certify::{Certificate, Closest, LimitCheck, Reached, Refusal, RefusalKind};
+use crate::certify::{Certificate, Closest, InTube, LimitCheck, Reached, Refusal, RefusalKind, Trust};
 use crate::command::CommandTable;
 use crate::diag::{Diagnostics, Severity};
 use crate::map::VoxelMap;
@@ -34,6 +34,7 @@ impl Report {
             limits: Vec::new(),
             commands: None,
             certificate: None,
+            trust: None,
             path_error: Vec::new(),
         }
     }
@@ -74,6 +75,7 @@ fn refusal(refusals: &[Refusal]) -> Option<Failure> {
 fn refusal_kind(kind: RefusalKind) -> &'static str {
     match kind {
         RefusalKind::Clearance => "clearance",
+        RefusalKind::Tolerance => "tolerance",
         RefusalKind::OwnLinks => "own_links",
         RefusalKind::Limit => "limit",
         RefusalKind::Position => "position",
@@ -231,9 +233,58 @@ impl From<&Certificate> for CertificatePart {
             vias: certificate.vias.iter().filter_map(via).collect(),
             limits_hold: certificate.limits_hold,
             closest: certificate.closest.as_ref().and_then(closest),
+            tolerance: certificate.tolerance.as_ref().map(in_tube),
             own_links: certificate
                 .own_links
                 .map(|own| OwnLinksPart { pairs_checked: own.pairs, keep_apart: own.apart }),
+        }
+    }
+}
+
+fn in_tube(proof: &InTube) -> InTubePart {
+    let (there, shares) = proof.there.unzip();
+    let shares = shares.map_or_else(Default::default, |shares| {
+        let named = shares.named().into_iter();
+        named.filter(|(_, share)| *share > 0.0).filter_map(|(key, m)| Some((key.to_owned(), finite(m)?))).collect()
+    });
+    InTubePart {
+        clearance_proven_m: proof.clearance_proven.map(|c| c.min(FAR)).and_then(finite),
+        closest: proof.closest.as_ref().and_then(closest),
+        closest_off_m: there.and_then(|width| finite(width.distance)),
+        closest_off_rad: there.and_then(|width| finite(width.angle)),
+        closest_shares_m: shares,
+        end_m: finite(proof.end.distance),
+        end_rad: finite(proof.end.angle),
+    }
+}
+
+impl From<&crate::mission::Tolerance> for TolerancePart {
+    fn from(tolerance: &crate::mission::Tolerance) -> Self {
+        Self {
+            wheel_radius: tolerance.wheel_radius,
+            wheel_difference: tolerance.wheel_difference,
+            track: tolerance.track,
+            latency_s: tolerance.latency,
+            start_m: tolerance.start_distance,
+            start_rad: tolerance.start_angle,
+        }
+    }
+}
+
+impl TrustPart {
+    /// `in_force`: the tolerance is the robot's, not assumed. `on_a_map`: whether there was anything to touch.
+    pub fn new(trust: &Trust, in_force: bool, on_a_map: bool) -> Self {
+        let (end, until) = (trust.end(), trust.until());
+        Self {
+            in_force,
+            tolerance: (&trust.tolerance).into(),
+            length_m: end.length,
+            duration_s: end.time,
+            end_m: finite(end.width.distance),
+            end_rad: finite(end.width.angle),
+            trusted_m: on_a_map.then_some(until.length),
+            trusted_s: on_a_map.then_some(until.time),
+            whole: on_a_map.then_some(trust.contact.is_none()),
         }
     }
 }
@@ -283,6 +334,7 @@ mod tests {
                 obstacle: Some(Aabb { min: [4.0, 4.05, 0.25], max: [4.05, 4.1, 0.3] }),
                 distance: 0.0523,
             }),
+            tolerance: None,
             own_links: None,
             end_point_error: 4e-5,
             end_heading_error: None,

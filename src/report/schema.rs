@@ -48,6 +48,9 @@ pub struct Report {
     /// What was proven.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub certificate: Option<CertificatePart>,
+    /// How far the commands can be trusted without feedback.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trust: Option<TrustPart>,
     /// Path error by sampling time.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub path_error: Vec<PathErrorRow>,
@@ -277,9 +280,79 @@ pub struct CertificatePart {
     /// The closest approach found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub closest: Option<ClosestPart>,
+    /// What was proven of every robot within the tolerance; absent where neither mission nor robot.yaml has a `tolerance`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<InTubePart>,
     /// The robot's links against each other; absent where none that are checked move against each other.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub own_links: Option<OwnLinksPart>,
+}
+
+/// What was proven of every robot within the tolerance (`trust.tolerance`).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct InTubePart {
+    /// A lower bound of their clearance, m; absent without a map. Where nothing is near, [`FAR`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clearance_proven_m: Option<f64>,
+    /// The closest approach of any of them, as far as it is bounded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub closest: Option<ClosestPart>,
+    /// How far the base may be off there, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub closest_off_m: Option<f64>,
+    /// How far the heading may be off there, rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub closest_off_rad: Option<f64>,
+    /// How much nearer each tolerance may bring the link there, m, by its key in a mission.
+    #[serde(default, skip_serializing_if = "std::collections::BTreeMap::is_empty")]
+    pub closest_shares_m: std::collections::BTreeMap<String, f64>,
+    /// How far the base may be off at the end, m.
+    pub end_m: Option<f64>,
+    /// How far the heading may be off at the end, rad.
+    pub end_rad: Option<f64>,
+}
+
+/// How far the commands can be trusted without feedback.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TrustPart {
+    /// Whether the mission or robot.yaml says the tolerance, so that it is certified; else it is assumed for this figure alone.
+    pub in_force: bool,
+    /// How far the robot may be off.
+    pub tolerance: TolerancePart,
+    /// Length of the base's path, m.
+    pub length_m: f64,
+    /// s.
+    pub duration_s: f64,
+    /// How far the base may be off at the end, m.
+    pub end_m: Option<f64>,
+    /// How far the heading may be off at the end, rad.
+    pub end_rad: Option<f64>,
+    /// Length of the path on which no robot within the tolerance touches anything, m; absent without a map.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trusted_m: Option<f64>,
+    /// The same in s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trusted_s: Option<f64>,
+    /// Whether that is the whole path.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub whole: Option<bool>,
+}
+
+/// How far a robot may be off; see docs/tolerance.md.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TolerancePart {
+    /// Both wheels' radii alike, as a share.
+    pub wheel_radius: f64,
+    /// The right wheel's radius less the left one's, as a share.
+    pub wheel_difference: f64,
+    /// The track width, as a share.
+    pub track: f64,
+    /// s.
+    pub latency_s: f64,
+    /// m.
+    pub start_m: f64,
+    /// rad.
+    pub start_rad: f64,
 }
 
 /// A via that was reached.

@@ -4,7 +4,7 @@ mod limits;
 
 use std::fmt::Write;
 
-use super::schema::{CertificatePart, LimitPart, Report, RobotPart, Status};
+use super::schema::{CertificatePart, LimitPart, Report, RobotPart, Status, TolerancePart, TrustPart};
 use crate::certify::{END_ANGLE_TOLERANCE, END_POINT_TOLERANCE};
 pub use limits::table as limits_table;
 
@@ -47,9 +47,15 @@ fn certified(inputs: &SummaryInputs<'_>) -> String {
     if let Some(certificate) = &report.certificate {
         proof(&mut out, certificate, &report.limits, report.robot.as_ref());
     }
+    if let Some(trust) = &report.trust {
+        line(&mut out, "trust", &trust_text(trust));
+    }
     path_error(&mut out, report);
     files(&mut out, inputs);
-    out += "\nProven of the model; wheel slip and tracking errors are not in it.\n";
+    out += match report.certificate.as_ref().and_then(|c| c.tolerance.as_ref()) {
+        Some(_) => "\nProven of every robot within the tolerance; wheel slip is not in it.\n",
+        None => "\nProven of the model; wheel slip and tracking errors are not in it.\n",
+    };
     if let Some(file) = inputs.files.iter().find(|f| f.starts_with("commands.") && !f.ends_with(".d")) {
         let _ = writeln!(out, "Next: trajc check {}", shell(&join(inputs.folder, file)));
     }
@@ -65,6 +71,7 @@ fn failed(inputs: &SummaryInputs<'_>) -> String {
     motion(&mut out, report);
     if let Some(certificate) = &report.certificate {
         clearance(&mut out, certificate);
+        tolerance(&mut out, certificate);
         own_links(&mut out, certificate, report.robot.as_ref());
         limits(&mut out, &report.limits, report.robot.as_ref());
     }
@@ -77,6 +84,7 @@ fn failed(inputs: &SummaryInputs<'_>) -> String {
 /// Lines that tell what a certificate says. `robot` knows which joints are measured in metres.
 pub fn proof(out: &mut String, certificate: &CertificatePart, peaks: &[LimitPart], robot: Option<&RobotPart>) {
     clearance(out, certificate);
+    tolerance(out, certificate);
     own_links(out, certificate, robot);
     goal(out, certificate);
     limits(out, peaks, robot);
@@ -146,6 +154,59 @@ fn clearance(out: &mut String, certificate: &CertificatePart) {
         };
         line(out, "", &format!("closest at {} s: {} to {what}", figure(closest.time_s), closest.link));
     }
+}
+
+/// What is proven of every robot within the tolerance; nothing where there is none.
+fn tolerance(out: &mut String, certificate: &CertificatePart) {
+    let Some(inside) = &certificate.tolerance else { return };
+    let mut text = match inside.clearance_proven_m {
+        Some(proven) if proven >= super::schema::FAR => "no obstacle anywhere".to_owned(),
+        Some(proven) => format!("{} proven of every robot within it", length(proven)),
+        None => "no map: clearance not checked".to_owned(),
+    };
+    if let Some(closest) = &inside.closest {
+        let what = match &closest.obstacle {
+            Some(b) => {
+                let at = [0, 1, 2].map(|i| format!("{:.2}", 0.5 * (b.min[i] + b.max[i])));
+                format!("the cell at ({})", at.join(&format!(",{TIE}")))
+            }
+            None => "unseen space".to_string(),
+        };
+        text += &format!(", at {} s from {what}", figure(closest.time_s));
+    }
+    line(out, "tolerance", &text);
+}
+
+/// How far the commands can be trusted without feedback, in words.
+pub fn trust_text(trust: &TrustPart) -> String {
+    let off = match (trust.end_m, trust.end_rad) {
+        (Some(m), Some(rad)) => format!("off by {} and {} at the end, at most", length(m), degrees(rad)),
+        _ => "off by anything at the end".to_owned(),
+    };
+    let whole = format!("{} m", figure(trust.length_m));
+    let part = match (trust.whole, trust.trusted_m, trust.trusted_s) {
+        (Some(true), ..) => format!("all {whole} without feedback, "),
+        (_, Some(m), Some(s)) => format!("{} of {whole} ({} s) without feedback, ", figure(m), figure(s)),
+        _ => String::new(),
+    };
+    let of = if trust.in_force { "within the tolerance" } else { "of usual accuracy (assumed)" };
+    format!("{part}by a robot {of}: {off}; {}", tolerance_text(&trust.tolerance))
+}
+
+/// A tolerance, in words; what is zero is left out.
+pub fn tolerance_text(tolerance: &TolerancePart) -> String {
+    let percent = |share: f64| format!("{}{TIE}%", figure(100.0 * share));
+    let parts = [
+        (tolerance.wheel_radius, "wheels", percent(tolerance.wheel_radius)),
+        (tolerance.wheel_difference, "difference", percent(tolerance.wheel_difference)),
+        (tolerance.track, "track", percent(tolerance.track)),
+        (tolerance.latency_s, "latency", format!("{}{TIE}s", figure(tolerance.latency_s))),
+        (tolerance.start_m, "start", length(tolerance.start_m).replace(' ', TIE)),
+        (tolerance.start_rad, "start", degrees(tolerance.start_rad)),
+    ];
+    let given = parts.into_iter().filter(|(value, ..)| *value > 0.0);
+    let text = given.map(|(_, name, value)| format!("{name}{TIE}{value}")).collect::<Vec<_>>().join(", ");
+    if text.is_empty() { "nothing is off".to_owned() } else { text }
 }
 
 /// What of the clearance is proven, in words.

@@ -26,7 +26,7 @@ use std::path::Path;
 use nalgebra::{Isometry3, Unit, Vector3};
 
 use crate::diag::Diagnostics;
-use crate::mission::LimitsSpec;
+use crate::mission::{LimitsSpec, Tolerance, ToleranceSpec};
 pub use bodies::NoFiles;
 pub use convex::Convex;
 pub use findings::Finding;
@@ -74,6 +74,8 @@ pub struct RobotModel {
     pub base: BaseLimits,
     /// Pairs of links that move against each other and are not checked against each other; all others are.
     pub ignore_pairs: Vec<IgnoredPair>,
+    /// How far the real robot may be off this model; `None`: nobody said.
+    pub tolerance: Option<Tolerance>,
 }
 
 /// A joint that the planner moves.
@@ -300,6 +302,7 @@ fn assemble(inputs: RobotInputs<'_>) -> Result<Assembled, Diagnostics> {
         wheel,
         base,
         ignore_pairs: Vec::new(),
+        tolerance: ToleranceSpec::resolved(None, spec.tolerance),
     };
     robot.ignore_pairs = pairs::ignored(spec, &urdf, &tree, &roles, &robot);
     Ok(Assembled { urdf, tree, wheels, roles, drive, robot })

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::diag::shape::{Bounds, Field, Shape};
 use crate::diag::yaml::{Entry, Node};
 use crate::diag::{Diagnostic, Diagnostics, Source, Span, json_schema as schema, shape, yaml};
-use crate::mission::{LimitsSpec, limits};
+use crate::mission::{LimitsSpec, ToleranceSpec, limits, tolerance};
 
 /// A value and where it is written.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,6 +38,8 @@ pub struct RobotSpec {
     pub fixed: Vec<(Written<String>, f64)>,
     /// `limits`.
     pub limits: LimitsSpec,
+    /// `tolerance`.
+    pub tolerance: Option<ToleranceSpec>,
     /// Where each joint under `limits.joints` is named.
     pub limit_joints: Vec<Written<String>>,
     /// `collision.ignore_links`.
@@ -49,7 +51,7 @@ pub struct RobotSpec {
 const LINKS: Shape = Shape::List { item: &Shape::Text, count: (0, usize::MAX), form: "a list of link names" };
 const PAIR: Shape = Shape::List { item: &Shape::Text, count: (2, 2), form: "a pair of link names" };
 
-static ROBOT: [Field; 6] = [
+static ROBOT: [Field; 7] = [
     Field::optional("name", Shape::Text, "scr_db", "the robot's name; default: the URDF's"),
     Field::required("urdf", Shape::Text, "scr_db.urdf", "the URDF, relative to this file"),
     Field::optional(
@@ -69,6 +71,12 @@ static ROBOT: [Field; 6] = [
         Shape::Table(&limits::FIELDS),
         "{wheel: {speed_mps: 0.5, acceleration_mps2: 0.5, jerk_mps3: 2.0}}",
         "limits that the URDF does not say, or tighter ones",
+    ),
+    Field::optional(
+        "tolerance",
+        Shape::Table(&tolerance::FIELDS),
+        "{wheel_radius: 0.2%, wheel_difference: 0.1%, track: 1%}",
+        "how far the real robot may be off: clearance is then proven for every such robot",
     ),
     Field::optional(
         "collision",
@@ -178,6 +186,7 @@ impl Reader<'_> {
             moving: self.get("joints", "moving").map(|n| self.names(Some(n))),
             fixed: self.fixed(),
             limits: limits::read(self.root.get("limits")),
+            tolerance: tolerance::read(self.root.get("tolerance")),
             limit_joints: limits::joint_names(self.source, self.root.get("limits"))
                 .into_iter()
                 .map(|(value, span)| Written { value, span: Some(span) })

@@ -124,6 +124,7 @@ mod tests {
             wheel: MotionLimits { speed: None, acceleration: None, jerk: None },
             base,
             ignore_pairs: vec![],
+            tolerance: None,
         };
         let pose = crate::geom::Pose2::default();
         let [start_joints, goal_joints] = [vec![None], vec![None]];

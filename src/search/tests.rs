@@ -66,6 +66,7 @@ fn scr_db() -> RobotModel {
             min_speed: 0.01,
         },
         ignore_pairs: vec![],
+        tolerance: None,
     }
 }
 

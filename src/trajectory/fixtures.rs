@@ -24,6 +24,7 @@ pub fn robot(track_width: f64, wheel: [f64; 3], joints: Vec<MovingJoint>) -> Rob
             min_speed: 0.01,
         },
         ignore_pairs: Vec::new(),
+        tolerance: None,
     }
 }
 

@@ -37,6 +37,7 @@ pub(crate) fn bare_robot() -> RobotModel {
             min_speed: 0.01,
         },
         ignore_pairs: Vec::new(),
+        tolerance: None,
     }
 }
 
@@ -138,7 +139,7 @@ pub(crate) fn distance_at(
         row.joint_positions.iter().zip(&row.joint_velocities).map(|(q, rate)| q + rate * tau).collect();
     let pose = row.pose.after_twist(speed, turn, tau).isometry() * robot.shape_poses(&values)[index];
     let turn: Matrix3<f64> = pose.rotation.to_rotation_matrix().into_inner();
-    let posed = Posed { convex: &robot.shapes[index].convex, turn, centre: pose.translation.vector };
+    let posed = Posed { convex: &robot.shapes[index].convex, turn, centre: pose.translation.vector, spread: None };
     let cubes = cubes(map).into_iter().map(|cube| posed.separation(&cube).upper).fold(f64::INFINITY, f64::min);
     if map.outside == Unknown::Free {
         return cubes;

@@ -30,6 +30,7 @@ pub fn robot(base_from_root: Isometry3<f64>) -> RobotModel {
             min_speed: 0.01,
         },
         ignore_pairs: Vec::new(),
+        tolerance: None,
     }
 }
 

@@ -62,6 +62,9 @@ fn key_figures(report: &Report) -> Vec<(String, String)> {
             (None, _) => out.push(key("Clearance", "not checked", "the mission has no map")),
         }
     }
+    if let Some((name, value, below)) = report.trust.as_ref().and_then(super::trust::key) {
+        out.push(key(name, &value, &below));
+    }
     if let Some((row, share)) = tightest(&report.limits) {
         let name = format!("{} {}", row.actuator.replace('_', " "), row.quantity);
         out.push(key("Closest to a limit", &super::percent(share), &format!("of {name}")));

@@ -18,9 +18,10 @@ mod solid;
 mod still;
 #[cfg(test)]
 mod tests;
+mod trust;
 
 use super::Report;
-use crate::certify::{self, Instant};
+use crate::certify::{self, Instant, Trust};
 use crate::command::CommandTable;
 use crate::map::VoxelMap;
 use crate::mission::PoseSpec;
@@ -65,6 +66,8 @@ pub struct PageInputs<'a> {
     pub ends: [Option<&'a PoseSpec>; 2],
     /// Places of the base on the search's path, m.
     pub route: &'a [[f64; 2]],
+    /// How far the commands can be trusted.
+    pub trust: Option<&'a Trust>,
 }
 
 impl PageInputs<'_> {
@@ -120,6 +123,7 @@ pub fn html(inputs: &PageInputs<'_>) -> String {
         proof::limits(inputs, &actuators),
         plots::path_error(inputs.report),
         proof::certificate(inputs),
+        trust::section_of(inputs),
         background::comparison(inputs),
         background::run(inputs),
     ];

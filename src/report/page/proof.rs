@@ -5,7 +5,7 @@ use super::html::{self, Cell, definitions, escape, instant, section};
 use super::{PageInputs, at_least_mm, counted, degrees, figure, mm};
 use crate::certify::{END_ANGLE_TOLERANCE, END_POINT_TOLERANCE};
 use crate::report::plot::motion;
-use crate::report::schema::{CertificatePart, FAR, LimitPart};
+use crate::report::schema::{CertificatePart, FAR, InTubePart, LimitPart};
 
 /// Peaks against limits: a table, and charts over time.
 pub(super) fn limits(inputs: &PageInputs<'_>, actuators: &[Actuator]) -> String {
@@ -111,6 +111,9 @@ fn proven(inputs: &PageInputs<'_>, certificate: &CertificatePart) -> Vec<(String
             format!("{}: {} is {} from {of}", instant(closest.time_s), escape(&closest.link), mm(closest.distance_m));
         out.push(("Closest approach".into(), text));
     }
+    if let Some(inside) = &certificate.tolerance {
+        out.push(("Tolerance".into(), escape(&within_the_tolerance(inside))));
+    }
     if let Some(own) = certificate.own_links {
         let pairs = counted(own.pairs_checked, "pair");
         let verdict = if own.keep_apart { "never touch" } else { "are not shown to keep apart" };
@@ -146,6 +149,22 @@ fn proven(inputs: &PageInputs<'_>, certificate: &CertificatePart) -> Vec<(String
     out
 }
 
+/// What is proven of every robot within the tolerance.
+fn within_the_tolerance(inside: &InTubePart) -> String {
+    let clearance = match inside.clearance_proven_m {
+        Some(proven) if proven < FAR => format!("every robot within it keeps {}", at_least_mm(proven)),
+        Some(_) => "no obstacle anywhere near".into(),
+        None => "clearance is not checked: the mission has no map".into(),
+    };
+    let there = match (&inside.closest, inside.closest_off_m, inside.closest_off_rad) {
+        (Some(closest), Some(m), Some(rad)) => {
+            format!(", least at {:.1} s, where the base may be off by {} and {}", closest.time_s, mm(m), degrees(rad))
+        }
+        _ => String::new(),
+    };
+    clearance + &there
+}
+
 /// Whether unseen space counts as an obstacle.
 fn walled(inputs: &PageInputs<'_>) -> bool {
     inputs.map.is_some_and(|map| map.outside == crate::mission::Unknown::Occupied)
@@ -153,9 +172,14 @@ fn walled(inputs: &PageInputs<'_>) -> bool {
 
 /// What nobody may take from the certificate; HTML.
 fn unpromised(inputs: &PageInputs<'_>) -> Vec<String> {
+    let toleranced = inputs.report.certificate.as_ref().is_some_and(|c| c.tolerance.is_some());
     let mut out = vec![
         "<b>Slip and tracking.</b> Wheels that slip, and controllers that follow late or not exactly, are not in it: put what you expect of them into <code>clearance_m</code>.".to_owned(),
-        "<b>The model.</b> It speaks of the URDF, wheel radius and track width as given, and of what the map shows; what the map leaves out is not there.".to_owned(),
+        if toleranced {
+            "<b>The model.</b> Wheel radii, track width, latency and start may be off by the tolerance, and no more; it speaks of the URDF as given, and of what the map shows.".to_owned()
+        } else {
+            "<b>The model.</b> It speaks of the URDF, wheel radius and track width as given, and of what the map shows; what the map leaves out is not there.".to_owned()
+        },
         "<b>Moving things.</b> Nothing moves but the robot.".to_owned(),
     ];
     let ignored = inputs.report.robot.as_ref().map_or(0, |robot| robot.ignored_pairs.len());

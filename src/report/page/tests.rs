@@ -8,8 +8,8 @@ use crate::certify::{Goal, Task, certify};
 use crate::command::CommandRow;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::geom::Pose2;
-use crate::mission::{Sampling, Unknown};
-use crate::report::schema::{InputFile, InputsPart};
+use crate::mission::{Sampling, Tolerance, Unknown};
+use crate::report::schema::{InputFile, InputsPart, TrustPart};
 use crate::report::{Metrics, PathErrorRow};
 use crate::robot::{BaseLimits, Body, BodyMotion, Convex, IgnoreReason, IgnoredPair, MotionLimits, MovingJoint, Shape};
 
@@ -64,6 +64,7 @@ fn robot(joint: &str) -> RobotModel {
         },
         // They lie in one another, as far as this page is concerned by design.
         ignore_pairs: [["base", joint], ["base", "drum"], [joint, "drum"]].map(by_design).to_vec(),
+        tolerance: None,
     }
 }
 
@@ -116,6 +117,7 @@ struct Case {
     robot: RobotModel,
     map: Option<VoxelMap>,
     table: CommandTable,
+    trust: Option<Trust>,
 }
 
 impl Case {
@@ -148,7 +150,9 @@ impl Case {
             })
             .to_vec();
         report.judge(&certify(&table, &robot, Some(&map), &task));
-        Self { name: name.into(), report, robot, map: Some(map), table }
+        let trust = crate::certify::trust(&table, &robot, Some(&map), &task, Tolerance::ASSUMED);
+        report.trust = trust.as_ref().map(|trust| TrustPart::new(trust, false, true));
+        Self { name: name.into(), report, robot, map: Some(map), table, trust }
     }
 
     fn inputs(&self) -> PageInputs<'_> {
@@ -160,6 +164,7 @@ impl Case {
             commands: Some(&self.table),
             ends: [None, None],
             route: &[[0.0, 0.0], [1.0, 1.0]],
+            trust: self.trust.as_ref(),
         }
     }
 
@@ -438,6 +443,30 @@ fn pages_of_long_missions_on_rough_maps_stay_below_a_megabyte_and_say_what_they_
     assert!(page.len() < 1_000_000, "{} bytes", page.len());
     assert!(page.contains("rows one of every") && page.contains("The map is large"), "it says so");
     assert!(page.contains("more in the table alone"));
+}
+
+#[test]
+fn the_tube_is_drawn_to_scale_and_its_width_against_the_way_driven() {
+    let case = Case::new("m", "blade", 40, 0.05);
+    let page = case.page();
+    let trust = case.trust.as_ref().expect("commands that can be replayed");
+    for (point, outline) in trust.tube.iter().map(|point| (point, trust::outline(point))) {
+        let far = |p: &[f64; 2]| (p[0] - point.place[0]).hypot(p[1] - point.place[1]);
+        let most = outline.iter().map(far).fold(0.0, f64::max);
+        assert!(
+            most <= point.width.distance + 1e-12 && most > 0.9 * point.width.distance,
+            "{most} of {}",
+            point.width.distance
+        );
+    }
+    for said in ["id=\"trust\"", "where the base can be", "against the metres driven", "Nobody said how far", "assumed"]
+    {
+        assert!(page.contains(said), "{said}");
+    }
+    let mut report = case.report.clone();
+    report.trust.as_mut().expect("there").in_force = true;
+    assert!(!html(&PageInputs { report: &report, ..case.inputs() }).contains("Nobody said how far"));
+    assert!(!html(&PageInputs { trust: None, ..case.inputs() }).contains("id=\"trust\""));
 }
 
 #[test]

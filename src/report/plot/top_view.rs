@@ -112,6 +112,25 @@ impl TopView {
         self.add(Item::Line(points, paint), paint, name);
     }
 
+    /// A region that these outlines cover together, tinted, in the colour of this index.
+    pub fn region(&mut self, loops: Vec<Vec<[f64; 2]>>, colour: usize, name: &'static str) {
+        let colour = COLOURS[colour % COLOURS.len()];
+        let paint = Paint::line(colour, 0.5).tinted(colour, 0.12);
+        for outline in loops {
+            self.add(Item::Outlines(vec![outline], paint), paint, name);
+        }
+    }
+
+    /// How many points it is drawn from.
+    pub fn size(&self) -> usize {
+        let points = |item: &Item| match item {
+            Item::Outlines(loops, _) => loops.iter().map(Vec::len).sum(),
+            Item::Line(points, _) => points.len(),
+            Item::Note(..) | Item::Ring(_) => 1,
+        };
+        self.items.iter().map(points).sum()
+    }
+
     /// Another way through these points, dashed, in the colour of this index.
     pub fn trace(&mut self, points: Vec<[f64; 2]>, colour: usize, name: &'static str) {
         let paint = Paint::line(COLOURS[colour % COLOURS.len()], 1.8).dashed(["7 3", "2 2"][colour % 2]);

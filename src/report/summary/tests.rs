@@ -19,6 +19,7 @@ fn certificate() -> Certificate {
             obstacle: Some(Aabb { min: [4.0, 4.05, 0.25], max: [4.05, 4.1, 0.3] }),
             distance: 0.05231,
         }),
+        tolerance: None,
         own_links: None,
         end_point_error: 4.2e-5,
         end_heading_error: Some(1.7e-5),

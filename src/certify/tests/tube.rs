@@ -1,0 +1,301 @@
+use nalgebra::{Isometry3, Vector3};
+use proptest::prelude::*;
+
+use super::robots::*;
+use crate::certify::motion::Kinematics;
+use crate::certify::rollout::Rollout;
+use crate::certify::tube::Tube;
+use crate::certify::{RefusalKind, Task, certify, trust, tube_along};
+use crate::command::CommandTable;
+use crate::geom::Pose2;
+use crate::map::VoxelMap;
+use crate::mission::{Tolerance, Unknown};
+use crate::robot::{Convex, RobotModel};
+
+/// A robot that is not the model's: shares, -1 to 1, of each tolerance.
+#[derive(Debug, Clone, Copy)]
+struct Off {
+    wheel_radius: f64,
+    wheel_difference: f64,
+    track: f64,
+    /// Of the latency: the wheels' less the joints'.
+    apart: f64,
+    /// Where it starts: how far, in which direction, and its heading.
+    start: [f64; 3],
+}
+
+impl Off {
+    fn from(shares: [f64; 7]) -> Self {
+        let [wheel_radius, wheel_difference, track, apart, far, direction, heading] = shares;
+        Self { wheel_radius, wheel_difference, track, apart, start: [far, 4.0 * direction, heading] }
+    }
+
+    /// The same commands with its own wheels, and where it starts.
+    fn table(&self, table: &CommandTable, start: Pose2, tolerance: &Tolerance) -> (CommandTable, Pose2) {
+        let mut own = table.clone();
+        let both = 1.0 + self.wheel_radius * tolerance.wheel_radius;
+        let half = 0.5 * self.wheel_difference * tolerance.wheel_difference;
+        own.track_width *= 1.0 + self.track * tolerance.track;
+        for row in &mut own.rows {
+            row.wheel_left *= both - half;
+            row.wheel_right *= both + half;
+        }
+        let [far, direction, heading] = self.start;
+        let far = far.abs() * tolerance.start_distance;
+        let yaw = start.yaw + heading * tolerance.start_angle;
+        (own, Pose2::new(start.x + far * direction.cos(), start.y + far * direction.sin(), yaw))
+    }
+}
+
+fn corners() -> impl Iterator<Item = Off> {
+    (0..64usize).map(|bits| {
+        let side = |i: usize| if bits >> i & 1 == 1 { 1.0 } else { -1.0 };
+        Off { wheel_radius: side(0), wheel_difference: side(1), track: side(2), apart: 0.0, start: [1.0, 0.0, side(3)] }
+    })
+}
+
+fn any_off() -> impl Strategy<Value = Off> {
+    let share = || prop_oneof![-1.0..1.0f64, Just(1.0), Just(-1.0)];
+    [share(), share(), share(), share(), share(), share(), share()].prop_map(Off::from)
+}
+
+fn any_tolerance() -> impl Strategy<Value = Tolerance> {
+    let most = [0.1, 0.1, 0.4, 0.2, 0.05, 0.4];
+    [0.0..1.0, 0.0..1.0, 0.0..1.0, 0.0..1.0, 0.0..1.0, 0.0..1.0f64].prop_map(move |shares| Tolerance {
+        wheel_radius: shares[0] * most[0],
+        wheel_difference: shares[1] * most[1],
+        track: shares[2] * most[2],
+        latency: shares[3] * most[3],
+        start_distance: shares[4] * most[4],
+        start_angle: shares[5] * most[5],
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn no_point_of_a_robot_within_the_tolerance_is_outside_the_tube_at_any_instant(
+        robot in any_robot(), (start, values, step, held) in any_motion(), tolerance in any_tolerance(), off in any_off(),
+        part in 0.0..1.0f64, normal in [-1.0..1.0, -1.0..1.0, -1.0..1.0f64],
+    ) {
+        let (values, held) = cut(&robot, &values, &held);
+        let (table, _) = commands(&robot, start, &values, step, &held);
+        let rollout = Rollout::new(&table, start, &values);
+        let tube = Tube::new(&rollout, &robot, tolerance);
+        let (own, from) = off.table(&table, start, &tolerance);
+        let own_poses = own.replay(from);
+        let kinematics = Kinematics::new(&robot);
+        let Some(normal) = Vector3::from(normal).try_normalize(0.1) else { return Ok(()) };
+        let (mut joints, mut bodies, mut late) = (Vec::new(), Vec::new(), Vec::new());
+        for (row, own_pose) in own_poses.iter().enumerate().take(held.len()) {
+            let (middle, half) = (0.5 * step, 0.5 * step * part);
+            for shape in 0..robot.shapes.len() {
+                let mut loose = |tau: f64, half: f64| {
+                    rollout.extreme_joints(row, &mut joints);
+                    let acceleration = kinematics.acceleration(shape, rollout.held(row), &joints);
+                    rollout.joints_at(row, tau, &mut joints);
+                    kinematics.bodies(&joints, rollout.held(row), &mut bodies);
+                    let mut moving = kinematics.shape(shape, &bodies, rollout.pose(row, tau), acceleration);
+                    tube.loosen(shape, &mut moving, (row, tau), half);
+                    moving
+                };
+                let whole = loose(middle, half);
+                let bounds = whole.reach(&normal, half);
+                for sample in -4..=4 {
+                    let tau = middle + half * f64::from(sample) / 4.0;
+                    let now = loose(tau, 0.0);
+                    // The joints are where they are meant to be at another time.
+                    let time = table.time(row) + tau + off.apart * tolerance.latency;
+                    let time = time.clamp(0.0, table.duration());
+                    let other = ((time / step) as usize).min(held.len());
+                    rollout.joints_at(other, time - table.time(other), &mut late);
+                    let (speed, turn_rate) = own.twist(row);
+                    let pose = own_pose.after_twist(speed, turn_rate, tau);
+                    let real = pose.isometry() * robot.shape_poses(&late)[shape];
+                    let local = real.rotation.inverse() * normal;
+                    let point = real * nalgebra::Point3::from(robot.shapes[shape].convex.support(&local));
+                    let at = normal.dot(&point.coords);
+                    let (bound, reach) = (normal.dot(&now.posed.centre) + now.posed.reach(&normal), at);
+                    prop_assert!(reach <= bound + 1e-9, "at an instant: {reach} > {bound}");
+                    let bound = normal.dot(&whole.posed.centre) + bounds[usize::from(sample > 0)];
+                    prop_assert!(reach <= bound + 1e-9, "over an interval: {reach} > {bound}");
+                    prop_assert!((point.coords - whole.posed.centre).norm() < 1e3);
+                    let base = rollout.pose(row, tau);
+                    let width = tube.width(row, tau);
+                    prop_assert!(base.distance(pose) <= width.distance + 1e-12);
+                    prop_assert!((pose.yaw - base.yaw).abs() <= width.angle + 1e-12);
+                }
+            }
+        }
+    }
+}
+
+/// 9 m of all kinds: straight, a spin there and a spin back, bends both ways, backwards; and where it starts.
+fn nine_metres(robot: &RobotModel) -> (CommandTable, Task) {
+    let stretches = [
+        (20, 0.4, 0.0),
+        (20, 0.0, 0.7),
+        (40, 0.45, -0.3),
+        (30, 0.4, 0.5),
+        (20, -0.3, 0.1),
+        (20, 0.0, -0.6),
+        (90, 0.5, 0.06),
+        (20, 0.4, 0.0),
+    ];
+    let held = stretches.into_iter().flat_map(|(rows, v, w)| std::iter::repeat_n((v, w, Vec::new()), rows));
+    commands(robot, Pose2::new(1.0, 2.0, 0.3), &[], 0.1, &held.collect::<Vec<_>>())
+}
+
+/// The greatest distance from the model's pose at a row's time over all rows, and that at the end.
+fn deviations(own: &CommandTable, from: Pose2, table: &CommandTable, start: Pose2) -> (f64, f64) {
+    let each: Vec<f64> = own.replay(from).iter().zip(table.replay(start)).map(|(a, b)| a.distance(b)).collect();
+    (each.iter().copied().fold(0.0, f64::max), each[each.len() - 1])
+}
+
+#[test]
+fn wheels_one_percent_off_and_a_right_wheel_a_fifth_of_a_percent_larger_are_inside_and_nearly_at_the_edge() {
+    let robot = RobotModel { wheel_radius: 0.08, track_width: 0.32, ..bare_robot() };
+    let (table, task) = nine_metres(&robot);
+    let cases = [
+        (Tolerance { wheel_radius: 0.01, ..Tolerance::default() }, [1.01, 1.01, 1.0]),
+        // Right alone: both are larger by half of it.
+        (Tolerance { wheel_radius: 0.001, wheel_difference: 0.002, ..Tolerance::default() }, [1.0, 1.002, 1.0]),
+        (Tolerance { track: 0.01, ..Tolerance::default() }, [1.0, 1.0, 0.99]),
+    ];
+    for (tolerance, [left, right, track]) in cases {
+        let mut own = table.clone();
+        own.track_width *= track;
+        own.rows
+            .iter_mut()
+            .for_each(|row| (row.wheel_left, row.wheel_right) = (row.wheel_left * left, row.wheel_right * right));
+        let (_, end) = deviations(&own, task.start, &table, task.start);
+        let tube = tube_along(&table, &robot, &task, tolerance);
+        let last = tube.last().expect("rows");
+        assert!((last.length - 10.0).abs() < 1.5, "{}", last.length);
+        assert!(end > 0.02 && last.width.distance >= end, "{} below {end}", last.width.distance);
+        assert!(last.width.distance <= 1.2 * end, "{} far above {end}", last.width.distance);
+    }
+}
+
+#[test]
+fn the_tube_is_not_much_wider_than_the_farthest_corner_of_the_tolerance() {
+    let robot = RobotModel { wheel_radius: 0.08, track_width: 0.32, ..bare_robot() };
+    let (table, task) = nine_metres(&robot);
+    let tolerance = Tolerance { latency: 0.0, ..Tolerance::ASSUMED };
+    let tube = tube_along(&table, &robot, &task, tolerance);
+    let nominal = table.replay(task.start);
+    let mut farthest = vec![(0.0f64, 0.0f64); nominal.len()];
+    for mut off in corners() {
+        for direction in 0..16 {
+            off.start[1] = f64::from(direction) / 16.0 * std::f64::consts::TAU;
+            let (own, from) = off.table(&table, task.start, &tolerance);
+            for ((most, pose), model) in farthest.iter_mut().zip(own.replay(from)).zip(&nominal) {
+                *most = (most.0.max(pose.distance(*model)), most.1.max((pose.yaw - model.yaw).abs()));
+            }
+        }
+    }
+    for (point, (distance, angle)) in tube.iter().zip(farthest) {
+        assert!(distance <= point.width.distance && angle <= point.width.angle + 1e-12);
+        assert!(point.width.distance <= 1.05 * distance + 1e-6, "{} against {distance}", point.width.distance);
+        assert!(point.width.angle <= 1.001 * angle + 1e-9, "{} against {angle}", point.width.angle);
+    }
+}
+
+#[test]
+fn a_spin_there_and_back_leaves_no_deviation_of_the_track() {
+    let robot = bare_robot();
+    let spin = |rate: f64| (0.0, rate, Vec::new());
+    let held: Vec<Twist> = [vec![spin(1.0); 30], vec![spin(-1.0); 30]].concat();
+    let (table, task) = commands(&robot, Pose2::default(), &[], 0.1, &held);
+    let tube = tube_along(&table, &robot, &task, Tolerance { track: 0.01, wheel_radius: 0.01, ..Tolerance::default() });
+    assert!(tube[30].width.angle > 0.05 && tube[60].width.angle < 1e-12);
+    assert!(tube.iter().all(|point| point.width.distance < 1e-8));
+}
+
+/// A corridor of 1 m along x, 8 m long; the robot is a box of 0.4 m.
+fn corridor() -> (RobotModel, VoxelMap, CommandTable, Task) {
+    let robot =
+        with_shape(bare_robot(), 0, Isometry3::translation(0.0, 0.0, 0.2), Convex::Box { half: [0.2, 0.2, 0.15] });
+    let mut map = VoxelMap::new(0.1, [-1.0, -0.6, 0.0], [100, 12, 5], Unknown::Free);
+    for i in 0..100 {
+        for k in 0..5 {
+            map.occupy([i, 0, k]);
+            map.occupy([i, 11, k]);
+        }
+    }
+    let (table, task) = commands(&robot, Pose2::default(), &[], 0.1, &vec![(0.5, 0.0, Vec::new()); 160]);
+    (robot, map, table, task)
+}
+
+#[test]
+fn along_a_corridor_only_what_leads_to_its_sides_counts_and_trust_ends_where_the_tube_meets_them() {
+    let (robot, map, table, task) = corridor();
+    let with = |tolerance: Tolerance| {
+        let robot = RobotModel { tolerance: Some(tolerance), ..robot.clone() };
+        certify(&table, &robot, Some(&map), &task)
+    };
+    // 0.3 m to each side. Wheels alike do not lead there, and the start does by what it is.
+    let alike = with(Tolerance { wheel_radius: 0.1, start_distance: 0.02, ..Tolerance::default() });
+    assert!(alike.holds(), "{:?}", alike.refusals);
+    let inside = alike.tolerance.expect("in force");
+    assert!((inside.clearance_proven.expect("a map") - 0.28).abs() < 1e-3);
+    assert!((inside.end.distance - 0.82).abs() < 1e-6);
+
+    // A circle of radius D/delta = 80 m: 0.4 m to the side after 8 m, and the corners turn 0.2 x 0.1 m nearer.
+    let uneven = Tolerance { wheel_difference: 0.005, ..Tolerance::default() };
+    let refused = with(uneven);
+    assert!(refused.refusals.iter().all(|r| r.kind == RefusalKind::Tolerance) && refused.refusals.len() == 1);
+    assert!(refused.refusals[0].message.contains("wheel_difference"), "{}", refused.refusals[0].message);
+    assert!((refused.clearance_proven.expect("a map") - 0.3).abs() < 1e-3, "of the model itself");
+    let trusted = trust(&table, &robot, Some(&map), &task, uneven).expect("rows");
+    let until = trusted.until();
+    let to_the_side = |x: f64| x * x / 160.0 + 0.2 * x / 80.0 - 0.3;
+    assert!(to_the_side(until.length) < 0.0 && to_the_side(until.length + 0.2) > 0.0, "{}", until.length);
+    assert_eq!(trust(&table, &robot, Some(&map), &task, Tolerance::default()).expect("rows").contact, None);
+}
+
+#[test]
+fn a_tolerance_of_nothing_proves_what_is_proven_without_one() {
+    let (mut robot, map, table, task) = corridor();
+    let without = certify(&table, &robot, Some(&map), &task);
+    robot.tolerance = Some(Tolerance::default());
+    let with = certify(&table, &robot, Some(&map), &task);
+    let inside = with.tolerance.clone().expect("in force");
+    assert!((inside.clearance_proven.expect("a map") - without.clearance_proven.expect("a map")).abs() < 1e-6);
+    assert!(inside.end.distance < 1e-8 && inside.end.angle == 0.0);
+}
+
+#[test]
+fn of_many_random_robots_within_a_certified_tolerance_none_comes_nearer_than_proven() {
+    let (robot, map, table, task) = corridor();
+    let tolerance = Tolerance { wheel_difference: 0.002, start_angle: 0.005, ..Tolerance::ASSUMED };
+    let robot = RobotModel { tolerance: Some(tolerance), ..robot };
+    let certificate = certify(&table, &robot, Some(&map), &task);
+    assert!(certificate.holds(), "{:?}", certificate.refusals);
+    let proven = certificate.tolerance.and_then(|t| t.clearance_proven).expect("a map");
+    let mut least = f64::INFINITY;
+    for index in 1..400 {
+        // Halton's points, the corners first.
+        let share = |base: usize| {
+            let (mut at, mut scale, mut rest) = (0.0, 1.0, index);
+            while rest > 0 {
+                scale /= base as f64;
+                at += scale * (rest % base) as f64;
+                rest /= base;
+            }
+            2.0 * at - 1.0
+        };
+        let mut off = Off::from([2, 3, 5, 7, 11, 13, 17].map(share));
+        if let Some(corner) = corners().nth(index) {
+            off = Off { start: [1.0, std::f64::consts::FRAC_PI_2, corner.start[2]], ..corner };
+        }
+        let (own, from) = off.table(&table, task.start, &tolerance);
+        for pose in own.replay(from) {
+            let side = |x: f64, y: f64| (pose.y + x * pose.yaw.sin() + y * pose.yaw.cos()).abs();
+            let reach = [(0.2, 0.2), (0.2, -0.2), (-0.2, 0.2), (-0.2, -0.2)].map(|(x, y)| side(x, y));
+            least = least.min(0.5 - reach.into_iter().fold(0.0, f64::max));
+        }
+    }
+    assert!(proven <= least && proven > least - 0.01, "{proven} against {least}");
+}
