@@ -388,6 +388,7 @@ fn goal(mission: &Mission, robot: &RobotModel, given_end: Option<Pose2>) -> Goal
     Goal {
         x: of(|g| g.x, |end| end.x).unwrap_or_default(),
         y: of(|g| g.y, |end| end.y).unwrap_or_default(),
+        within: asked.map_or(0.0, |g| g.within),
         yaw: of(|g| g.yaw, |end| end.yaw),
         joints: robot.joints.iter().map(|j| asked.and_then(|g| g.joints.get(&j.name).copied())).collect(),
     }
@@ -398,6 +399,7 @@ fn place_of(place: &PoseSpec, robot: &RobotModel) -> Goal {
     Goal {
         x: place.x.unwrap_or_default(),
         y: place.y.unwrap_or_default(),
+        within: place.within,
         yaw: place.yaw,
         joints: robot.joints.iter().map(|joint| place.joints.get(&joint.name).copied()).collect(),
     }
@@ -436,10 +438,11 @@ fn given_path(
     for (which, spec, own, span) in ends {
         let Some(spec) = spec else { continue };
         let off = |a: Option<f64>, b: f64| a.is_some_and(|a| (a - b).abs() > 1e-6);
-        if off(spec.x, own.x)
-            || off(spec.y, own.y)
-            || spec.yaw.is_some_and(|yaw| wrap_angle(yaw - own.yaw).abs() > 1e-6)
-        {
+        let elsewhere = match spec.x.zip(spec.y) {
+            Some((x, y)) if spec.within > 0.0 => (x - own.x).hypot(y - own.y) > spec.within,
+            _ => off(spec.x, own.x) || off(spec.y, own.y),
+        };
+        if elsewhere || spec.yaw.is_some_and(|yaw| wrap_angle(yaw - own.yaw).abs() > 1e-6) {
             let message = format!(
                 "`{which}` contradicts the given path, which has x {:.6}, y {:.6}, heading {:.6} rad there",
                 own.x, own.y, own.yaw

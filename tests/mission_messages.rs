@@ -93,6 +93,7 @@ fn wrong_keys() {
     mission("no_value", &with("goal:"));
     mission("no_space_in_braces", &with("goal: {x_m:9.0, y_m: 8.0}"));
     mission("decimal_comma", &with("goal: {x_m: 9,5, y_m: 8.0}"));
+    mission("goal_radius", &with("goal: {x_m: 9.0, y_m: 8.0, radius_m: 0.3, yaw: 90deg}"));
     mission("via", &with("via: {x_m: 4.0, y_m: 4.0}"));
     mission("via_keys", &with("via: [{x_m: 4.0, dwell: 2}]"));
     mission("via_dwell", &with("via: [{x_m: 4.0, y_m: 4.0, dwell_s: -1}]"));
@@ -127,6 +128,9 @@ fn wrong_values() {
     mission("time_law_word", &with("time_law: fastest"));
     mission("flag", &with("reverse: yes"));
     mission("list_for_table", &with("start: [0.5, 0.5, 0]"));
+    mission("goal_within_zero", &with("goal: {x_m: 9.0, y_m: 8.0, within_m: 0}"));
+    mission("goal_yaw_word", &with("goal: {x_m: 9.0, y_m: 8.0, yaw: free}"));
+    mission("start_yaw_any", &with("start: {x_m: 9.0, y_m: 8.0, yaw: any}"));
     mission("angle_degree_sign", &with("start: {x_m: 0.5, y_m: 0.5, yaw: 90°}"));
     mission("angle_space", &with("start: {x_m: 0.5, y_m: 0.5, yaw: 90 deg}"));
     mission("angle_pi", &with("start: {x_m: 0.5, y_m: 0.5, yaw: pi/2}"));

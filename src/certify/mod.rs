@@ -51,10 +51,19 @@ pub struct Goal {
     pub x: f64,
     /// m.
     pub y: f64,
+    /// How far from there will do, m; [`END_POINT_TOLERANCE`] where that is more.
+    pub within: f64,
     /// rad.
     pub yaw: Option<f64>,
     /// One per moving joint.
     pub joints: Vec<Option<f64>>,
+}
+
+impl Goal {
+    /// How far from its point a motion may end, m.
+    pub fn allowed(&self) -> f64 {
+        self.within.max(END_POINT_TOLERANCE)
+    }
 }
 
 /// A place on the way at which the robot must stand.
@@ -89,8 +98,10 @@ pub struct Certificate {
     pub closest: Option<Closest>,
     /// The robot's links against each other; `None` where none that are checked move against each other.
     pub own_links: Option<OwnLinks>,
-    /// m.
+    /// From the goal's point, m.
     pub end_point_error: f64,
+    /// What that may be, m: [`END_POINT_TOLERANCE`], or the radius of the goal's region.
+    pub end_point_allowed: f64,
     /// rad; `None` where the goal leaves the heading open.
     pub end_heading_error: Option<f64>,
     /// Each via in order, as far as they were reached.
@@ -214,6 +225,7 @@ pub fn certify_through(
         closest: None,
         own_links: None,
         end_point_error: f64::INFINITY,
+        end_point_allowed: task.goal.allowed(),
         end_heading_error: task.goal.yaw.map(|_| f64::INFINITY),
         vias: Vec::new(),
         limits: Vec::new(),

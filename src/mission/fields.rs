@@ -23,13 +23,13 @@ pub(super) static MISSION: [Field; 14] = [
     ),
     Field::optional(
         "start",
-        Shape::Table(&POSE),
+        Shape::Table(&START),
         "{x_m: 0.5, y_m: 0.5, yaw: 0deg}",
         "where the robot stands; a joint left out is the compiler's choice",
     ),
     Field::optional(
         "goal",
-        Shape::Table(&POSE),
+        Shape::Table(&GOAL),
         "{x_m: 9.0, y_m: 8.0, yaw: 90deg}",
         "where it must come to rest; yaw or joints left out are the compiler's choice",
     ),
@@ -141,7 +141,34 @@ static MAP: [Field; 7] = [
     ),
 ];
 
-pub(super) static POSE: [Field; 4] = [
+/// How far from a place will do: less than this is what every end may miss its place by.
+const WITHIN: Shape = Shape::Number(Bounds::between(0.001, 1000.0, "m"));
+const ANY_YAW: Shape = Shape::AngleOr(Bounds::any("rad"), "any");
+
+pub(super) static GOAL: [Field; 5] = [
+    Field::optional("x_m", METRES, "9.0", "metres, map frame"),
+    Field::optional("y_m", METRES, "8.0", "metres, map frame"),
+    Field::optional(
+        "within_m",
+        WITHIN,
+        "0.3",
+        "anywhere so near to that point will do, metres; left out: at the point, but for 1 mm",
+    ),
+    Field::optional(
+        "yaw",
+        ANY_YAW,
+        "90deg",
+        "heading, radians or degrees, counter-clockwise from x; `any` or left out: any heading",
+    ),
+    Field::optional(
+        "joints",
+        Shape::Named(&Shape::Angle(Bounds::any("rad or m"))),
+        "{blade: 90deg}",
+        "joint positions by name: radians, metres or degrees; left out: any",
+    ),
+];
+
+pub(super) static START: [Field; 4] = [
     Field::optional("x_m", METRES, "0.5", "metres, map frame"),
     Field::optional("y_m", METRES, "0.5", "metres, map frame"),
     Field::optional(
@@ -159,14 +186,20 @@ pub(super) static POSE: [Field; 4] = [
 ];
 
 static VIA: Shape = Shape::Table(&STOP);
-static STOP: [Field; 5] = [
+static STOP: [Field; 6] = [
     Field::required("x_m", METRES, "4.0", "metres, map frame"),
     Field::required("y_m", METRES, "4.0", "metres, map frame"),
     Field::optional(
+        "within_m",
+        WITHIN,
+        "0.3",
+        "anywhere so near to that point will do, metres; left out: at the point, but for 1 mm",
+    ),
+    Field::optional(
         "yaw",
-        Shape::Angle(Bounds::any("rad")),
+        ANY_YAW,
         "90deg",
-        "heading, radians or degrees, counter-clockwise from x; left out: as it comes",
+        "heading, radians or degrees, counter-clockwise from x; `any` or left out: as it comes",
     ),
     Field::optional(
         "joints",

@@ -136,6 +136,8 @@ pub struct PoseSpec {
     pub x: Option<f64>,
     /// Metres.
     pub y: Option<f64>,
+    /// How far from there will do, metres; 0: there, but for what a certificate allows every end. Of goals and vias.
+    pub within: f64,
     /// Radians.
     pub yaw: Option<f64>,
     /// Joint values by name: radians or metres.

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::fields::{MISSION, PARAMETERISATIONS, PATH, POSE, SAMPLING_LAWS, TIME_LAWS};
+use super::fields::{GOAL, MISSION, PARAMETERISATIONS, PATH, SAMPLING_LAWS, START, TIME_LAWS};
 use super::{
     MapSpec, Mission, MissionSpans, NamedJoint, Parameterisation, PathSpec, PoseSpec, Sampling, TimeLaw, Unknown,
     ViaSpec, limits, solids,
@@ -91,6 +91,7 @@ fn pose(node: &Node) -> PoseSpec {
     PoseSpec {
         x: node.get("x_m").and_then(Node::number),
         y: node.get("y_m").and_then(Node::number),
+        within: node.get("within_m").and_then(Node::number).unwrap_or(0.0),
         yaw: node.get("yaw").and_then(Node::angle),
         joints: joints.iter().filter_map(|e| Some((e.key.clone(), e.value.angle()?))).collect(),
     }
@@ -217,12 +218,14 @@ impl Between<'_> {
             let hint = format!("add `{key}: {example}`");
             faults.push(Diagnostic::error("mission/missing-key", message).at(&top).hint(hint));
         }
-        for (key, parts) in [("start", &["x_m", "y_m", "yaw"][..]), ("goal", &["x_m", "y_m"])] {
+        for (key, table, parts) in
+            [("start", &START[..], &["x_m", "y_m", "yaw"][..]), ("goal", &GOAL[..], &["x_m", "y_m"])]
+        {
             let Some(pose) = self.root.entry(key) else { continue };
             // Not a map at all: already said.
             let empty = matches!(&pose.value.value, yaml::Value::Map(_));
             let missing: Vec<String> =
-                parts.iter().filter(|p| empty && !self.has(&pose.value, &POSE, p)).map(|p| format!("`{p}`")).collect();
+                parts.iter().filter(|p| empty && !self.has(&pose.value, table, p)).map(|p| format!("`{p}`")).collect();
             if !missing.is_empty() {
                 let are = if missing.len() == 1 { "is" } else { "are" };
                 let message = format!("`{key}` needs {}, which {are} missing", one_and_one(&missing));

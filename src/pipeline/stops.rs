@@ -41,6 +41,7 @@ pub(super) fn plan(
             start: from.pose,
             start_joints: from.joints.clone(),
             goal: pose(place, 0.0),
+            goal_within: place.within,
             goal_yaw: place.yaw,
             goal_joints: joints(place, robot),
         };

@@ -4,7 +4,7 @@ use serde_json::{Map, Value, json};
 
 use super::schema::*;
 use super::{Metrics, Report, Status, names};
-use crate::certify::{Certificate, Closest, LimitCheck, Reached, Refusal, RefusalKind};
+use crate::certify::{Certificate, Closest, END_POINT_TOLERANCE, LimitCheck, Reached, Refusal, RefusalKind};
 use crate::command::CommandTable;
 use crate::diag::{Diagnostics, Severity};
 use crate::map::VoxelMap;
@@ -227,6 +227,7 @@ impl From<&Certificate> for CertificatePart {
             clearance_required_m: certificate.clearance_required.and_then(finite),
             clearance_proven_m: proven.and_then(finite),
             end_point_error_m: finite(certificate.end_point_error),
+            goal_within_m: Some(certificate.end_point_allowed).filter(|m| *m > END_POINT_TOLERANCE).and_then(finite),
             end_heading_error_rad: certificate.end_heading_error.and_then(finite),
             vias: certificate.vias.iter().filter_map(via).collect(),
             limits_hold: certificate.limits_hold,
@@ -285,6 +286,7 @@ mod tests {
             }),
             own_links: None,
             end_point_error: 4e-5,
+            end_point_allowed: END_POINT_TOLERANCE,
             end_heading_error: None,
             vias: Vec::new(),
             limits: vec![LimitCheck { actuator: "wheel_left".into(), quantity: "jerk", peak: 0.1, limit: None }],

@@ -264,8 +264,11 @@ pub struct CertificatePart {
     /// A lower bound of the true clearance, m; absent without a map. Where nothing is near, [`FAR`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clearance_proven_m: Option<f64>,
-    /// m; `null`: not a number.
+    /// From the goal's point, m; `null`: not a number.
     pub end_point_error_m: Option<f64>,
+    /// How far from its point a goal with `within_m` allows, m; absent where it allows what every end may miss.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub goal_within_m: Option<f64>,
     /// rad; absent where the goal leaves the heading open.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub end_heading_error_rad: Option<f64>,

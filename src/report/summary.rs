@@ -199,12 +199,17 @@ fn goal(out: &mut String, certificate: &CertificatePart) {
 
 /// How far from the goal the motion ends, in words.
 pub fn goal_text(certificate: &CertificatePart) -> Option<String> {
-    let (mut missed, mut allowed) = (length(certificate.end_point_error_m?), length(END_POINT_TOLERANCE));
+    let (error, region) = (certificate.end_point_error_m?, certificate.goal_within_m);
+    let (mut missed, mut allowed) = (length(error), length(region.unwrap_or(END_POINT_TOLERANCE)));
+    if region.is_some() {
+        missed += " from its middle";
+    }
     if let Some(heading) = certificate.end_heading_error_rad {
         missed += &format!(" and {}", degrees(heading));
         allowed += &format!(" and {}", degrees(END_ANGLE_TOLERANCE));
     }
-    Some(format!("missed by {missed}; allowed: {allowed}"))
+    let missed = if region.is_some() { missed } else { format!("missed by {missed}") };
+    Some(format!("{missed}; allowed: {allowed}"))
 }
 
 fn limits(out: &mut String, peaks: &[LimitPart], robot: Option<&RobotPart>) {

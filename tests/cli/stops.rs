@@ -76,6 +76,34 @@ fn a_stretch_without_a_way_is_named() {
 }
 
 #[test]
+fn a_goal_with_a_radius_is_proven_as_that_region() {
+    let sandbox = sandbox_with("via: [{x_m: 2.0, y_m: 0.6, within_m: 0.2, yaw: any}]");
+    let goal = "goal: {x_m: 3.4, y_m: 1.5, yaw: 0deg}";
+    sandbox.edit("missions/a.yaml", goal, "goal: {x_m: 3.4, y_m: 1.5, within_m: 0.4, yaw: any}");
+    let run = sandbox.run(&["compile", "missions/a.yaml"]).expect(0);
+    assert!(run.stdout.contains(" from its middle; allowed: 400 mm\n"), "{}", run.stdout);
+    let report: Value = serde_json::from_slice(&sandbox.read("out/a/report.json")).expect("JSON");
+    let proof = &report["certificate"];
+    let off = proof["end_point_error_m"].as_f64().expect("a number");
+    let last = rows(&sandbox, &["x_m", "y_m"]).pop().expect("rows");
+    assert!(off < 0.4 && off > 0.3 && ((last[0] - 3.4).hypot(last[1] - 1.5) - off).abs() < 1e-6, "{off} {last:?}");
+    assert_eq!(proof["goal_within_m"], 0.4);
+    let via = proof["vias"][0]["point_error_m"].as_f64().expect("a number");
+    assert!(via < 0.2 && via > 0.1, "{via}");
+    sandbox.run(&["check", "out/a/commands.mcap"]).expect(0);
+    // What was asked is what is proven: a smaller region is another one.
+    sandbox.edit("missions/a.yaml", "within_m: 0.4", "within_m: 0.39");
+    let run = sandbox.run(&["check", "out/a/commands.csv", "--mission", "missions/a.yaml"]).expect(1);
+    assert!(run.stdout.contains("from the goal (390 mm allowed)"), "{}", run.stdout);
+    sandbox.run(&["inspect", "missions/a.yaml", "--plot", "a.svg"]).expect(0);
+    assert!(sandbox.text("a.svg").contains("any place will do"));
+    // The post's own place, and nothing that is free around it.
+    sandbox.edit("missions/a.yaml", "{x_m: 3.4, y_m: 1.5, within_m: 0.39", "{x_m: 1.95, y_m: 1.5, within_m: 0.1");
+    let run = sandbox.run(&["compile", "missions/a.yaml"]).expect(1);
+    assert!(run.stderr.contains("the goal is any place within 0.1 m of (1.950, 1.500)"), "{}", run.stderr);
+}
+
+#[test]
 fn areas_and_boxes_of_the_mission_are_driven_around_and_are_in_the_proof() {
     let south = "keep_out: [{polygon_m: [[1.6, 0.0], [2.4, 0.0], [2.0, 1.4]]}]";
     let north = "boxes: [{min_m: [1.8, 1.6, 0.0], max_m: [2.2, 3.0, 0.2]}]";
