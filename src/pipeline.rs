@@ -46,6 +46,17 @@ pub struct MapFile {
     pub beside: Option<(String, Vec<u8>)>,
 }
 
+/// A command file that was read, where whose motion ends another one starts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StartFile {
+    /// Path as the user knows it.
+    pub name: String,
+    /// All of it.
+    pub bytes: Vec<u8>,
+    /// Its commands.
+    pub table: CommandTable,
+}
+
 /// Everything a mission names, read. (`cli` reads; no stage opens a file but meshes through `files`.)
 pub struct Inputs {
     /// Parsed.
@@ -62,6 +73,8 @@ pub struct Inputs {
     pub map: Option<MapFile>,
     /// `path: {file}`.
     pub path_csv: Option<TextFile>,
+    /// `start: {file}`.
+    pub start_file: Option<StartFile>,
     /// Reader for meshes.
     pub files: Box<dyn Files>,
 }
@@ -491,6 +504,7 @@ pub fn inputs_part(inputs: &Inputs) -> InputsPart {
     if inputs.robot_yaml.is_some() {
         other.push(file(&inputs.urdf.name, inputs.urdf.text.as_bytes()));
     }
+    other.extend(inputs.start_file.iter().map(|f| file(&f.name, &f.bytes)));
     other.extend(inputs.path_csv.iter().map(|f| file(&f.name, f.text.as_bytes())));
     let map = inputs.map.as_ref();
     other.extend(map.and_then(|m| m.beside.as_ref()).map(|(name, bytes)| file(name, bytes)));

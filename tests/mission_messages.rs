@@ -94,6 +94,9 @@ fn wrong_keys() {
     mission("no_space_in_braces", &with("goal: {x_m:9.0, y_m: 8.0}"));
     mission("decimal_comma", &with("goal: {x_m: 9,5, y_m: 8.0}"));
     mission("goal_radius", &with("goal: {x_m: 9.0, y_m: 8.0, radius_m: 0.3, yaw: 90deg}"));
+    mission("start_file_and_joints", &with("start: {file: ../out/b/commands.csv, yaw: 0, joints: {blade: 0}}"));
+    mission("start_file_and_path", "robot: r.yaml\nstart: {file: c.csv}\npath: {file: a.csv}\n");
+    mission("start_file_number", &with("start: {file: 3}"));
     mission("via", &with("via: {x_m: 4.0, y_m: 4.0}"));
     mission("via_keys", &with("via: [{x_m: 4.0, dwell: 2}]"));
     mission("via_dwell", &with("via: [{x_m: 4.0, y_m: 4.0, dwell_s: -1}]"));

@@ -168,6 +168,9 @@ fn of_mission(path: &Path) -> Result<Understood, Diagnostics> {
             out += &format!("  {name:<10} {}\n", pose(spec));
         }
     }
+    if let Some(file) = &mission.start_file {
+        out += &format!("             start from {}\n", file.display());
+    }
     out += &format!("  clearance  {} m, sampling time {} s\n", mission.clearance, mission.sampling_time);
     out += "  reads     ";
     for file in disk.paths() {

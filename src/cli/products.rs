@@ -175,6 +175,7 @@ impl Products<'_> {
                 robot_yaml: inputs.robot_yaml.as_ref().map(|f| f.text.as_str()),
                 urdf: &inputs.urdf.text,
                 report,
+                start_file: inputs.start_file.as_ref().map(|f| (file_name(&f.name), f.bytes.as_slice())),
                 path_csv: inputs.path_csv.as_ref().map(|f| f.text.as_str()),
                 meshes: &self.meshes(&start),
             })?;
@@ -205,6 +206,11 @@ pub const DEPFILE: &str = "commands.d";
 /// that were read, as spelled from the folder in which the program was started.
 pub fn dependencies(folder: &Path, target: &str, read: &[PathBuf], start: &Path) -> String {
     depfile(&spelled(&folder.join(target), start), read)
+}
+
+/// The part behind the last folder.
+fn file_name(path: &str) -> &str {
+    Path::new(path).file_name().and_then(|name| name.to_str()).unwrap_or(path)
 }
 
 /// The path that leads from a folder to a file, both absolute; with `..` where needed.

@@ -168,7 +168,7 @@ pub(super) static GOAL: [Field; 5] = [
     ),
 ];
 
-pub(super) static START: [Field; 4] = [
+pub(super) static START: [Field; 5] = [
     Field::optional("x_m", METRES, "0.5", "metres, map frame"),
     Field::optional("y_m", METRES, "0.5", "metres, map frame"),
     Field::optional(
@@ -182,6 +182,12 @@ pub(super) static START: [Field; 4] = [
         Shape::Named(&Shape::Angle(Bounds::any("rad or m"))),
         "{blade: 90deg}",
         "joint positions by name: radians, metres or degrees",
+    ),
+    Field::optional(
+        "file",
+        Shape::Text,
+        "../out/first/commands.csv",
+        "begin where the motion of this commands.csv or .mcap ends, instead of a pose and joints; relative to the mission",
     ),
 ];
 

@@ -24,6 +24,8 @@ pub struct Mission {
     pub map: Option<MapSpec>,
     /// Start; with a given path, what of it the mission overrides.
     pub start: Option<PoseSpec>,
+    /// A command file where whose motion ends this one starts, as written. What is in it becomes the start once it is read.
+    pub start_file: Option<PathBuf>,
     /// Goal; likewise.
     pub goal: Option<PoseSpec>,
     /// Where to stop on the way, in order.
@@ -69,6 +71,8 @@ pub struct MissionSpans {
     pub map_height: Option<Span>,
     /// `start` with its value.
     pub start: Option<Span>,
+    /// The value of `start.file`.
+    pub start_file: Option<Span>,
     /// `goal` with its value.
     pub goal: Option<Span>,
     /// Each item of `via`.

@@ -39,6 +39,7 @@ pub(super) fn parse(name: &str, text: &str) -> Result<Mission, Diagnostics> {
         robot: path(root.get("robot")).unwrap_or_default(),
         map: root.get("map").map(map),
         start: root.get("start").map(pose),
+        start_file: path(root.get("start").and_then(|start| start.get("file"))),
         goal: root.get("goal").map(pose),
         via: root.get("via").map_or(&[][..], Node::items).iter().map(via).collect(),
         path: root.get("path").and_then(given_path),
@@ -145,6 +146,7 @@ fn spans(source: &Arc<Source>, root: &Node) -> MissionSpans {
         map_resolution: value("map", "resolution_m"),
         map_height: value("map", "height_m"),
         start: whole("start"),
+        start_file: value("start", "file"),
         goal: whole("goal"),
         via: vias.iter().map(|via| Span::new(source, via.range.clone())).collect(),
         path: whole("path"),
@@ -177,6 +179,7 @@ impl Between<'_> {
         } else {
             self.search(&mut faults);
         }
+        self.start_file(&mut faults);
         if let Some(map) = self.root.get("map") {
             faults.extend(solids::check(self.source, map));
         }
@@ -222,6 +225,9 @@ impl Between<'_> {
             [("start", &START[..], &["x_m", "y_m", "yaw"][..]), ("goal", &GOAL[..], &["x_m", "y_m"])]
         {
             let Some(pose) = self.root.entry(key) else { continue };
+            if key == "start" && self.has(&pose.value, table, "file") {
+                continue;
+            }
             // Not a map at all: already said.
             let empty = matches!(&pose.value.value, yaml::Value::Map(_));
             let missing: Vec<String> =
@@ -236,6 +242,26 @@ impl Between<'_> {
                 let at = Span::new(self.source, pose.key_range.clone());
                 faults.push(Diagnostic::error("mission/missing-key", message).at(&at).hint(hint));
             }
+        }
+    }
+
+    /// A file says where it ends, with all joints: nothing else may.
+    fn start_file(&self, faults: &mut Vec<Diagnostic>) {
+        let Some(start) = self.root.get("start") else { return };
+        let Some(file) = start.entry("file") else { return };
+        if self.has(self.root, &MISSION, "path") {
+            let at = Span::new(self.source, file.key_range.clone());
+            let message = "`start.file` and a given `path` exclude each other: a given path begins where it does";
+            let hint = "remove `start`, or plan the way with `map` and `goal`";
+            faults.push(Diagnostic::error("mission/start-and-path", message).at(&at).hint(hint));
+        }
+        for key in ["x_m", "y_m", "yaw", "joints"] {
+            let Some(entry) = start.entry(key) else { continue };
+            let at = Span::new(self.source, entry.key_range.clone());
+            let message =
+                format!("`start.{key}` and `start.file` exclude each other: the file's last row says where all is");
+            let hint = format!("remove `{key}`, or `file`");
+            faults.push(Diagnostic::error("mission/two-starts", message).at(&at).hint(hint));
         }
     }
 

@@ -148,6 +148,19 @@ fn a_later_stage_can_point_at_what_it_refuses() {
 }
 
 #[test]
+fn a_start_is_a_pose_or_a_file_that_ends_there() {
+    let text = LEAST.replace("{x_m: 1, y_m: 2, yaw: 0}", "{file: ../out/b/commands.mcap}");
+    let mission = good(&text);
+    assert_eq!(mission.start_file, Some("../out/b/commands.mcap".into()));
+    let span = mission.spans.start_file.expect("written");
+    assert_eq!(&text[span.range], "../out/b/commands.mcap");
+    for more in ["x_m: 1", "yaw: 90deg", "joints: {blade: 1}"] {
+        assert_eq!(codes(&text.replace(".mcap}", &format!(".mcap, {more}}}"))), ["mission/two-starts"]);
+    }
+    assert_eq!(codes("robot: r\nstart: {file: a.csv}\npath: {file: b.csv}\n"), ["mission/start-and-path"]);
+}
+
+#[test]
 fn a_heading_that_is_any_is_one_that_is_left_out() {
     let mission =
         good(&format!("{}via: [{{x_m: 1, y_m: 1, yaw: any}}]\n", LEAST.replace("y_m: 4}", "y_m: 4, yaw: any}")));
@@ -248,8 +261,12 @@ fn the_mission_with_every_key_has_every_key() {
         });
         let node = node.unwrap_or_else(|| panic!("{path:?}"));
         for field in table.iter().filter(|f| !matches!(f.shape, Shape::Later(_))) {
-            // Two ways to give a path; this mission has the other one.
-            assert!(field.key == "file" && path == ["path"] || node.get(field.key).is_some(), "{path:?} {}", field.key);
+            // Two ways to give a path or a start; this mission has the other one.
+            assert!(
+                field.key == "file" && (path == ["path"] || path == ["start"]) || node.get(field.key).is_some(),
+                "{path:?} {}",
+                field.key
+            );
         }
     }
 }
