@@ -13,7 +13,7 @@ pub use world::world;
 
 use std::time::Instant;
 
-use crate::certify::{self, Certificate, Goal, RefusalKind, Task, Via};
+use crate::certify::{self, Certificate, Demands, Goal, RefusalKind, Task, Via};
 use crate::command::{self, CommandTable, SampleOptions};
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::geom::{Pose2, wrap_angle};
@@ -305,10 +305,13 @@ impl Finish<'_> {
     /// The same of a task that is not the mission's.
     fn certify_task(&self, run: &mut Run<'_>, trajectory: Trajectory, task: &Task) -> Result<Made, Diagnostics> {
         let options = RetimeOptions { law: self.law(&trajectory), sampling_time: self.sampling_time };
-        let profile = run.stage("retime", || retime::retime(&trajectory, self.robot, &options))?;
+        let profile =
+            run.stage("retime", || retime::retime_in(&trajectory, self.robot, &options, self.mission.speed_zones()))?;
         let options = SampleOptions { sampling_time: self.sampling_time, sampling: self.mission.sampling };
         let commands = run.stage("command", || command::sample(&profile, self.robot, &options))?;
-        let certificate = run.stage("certify", || certify::certify(&commands, self.robot, self.map, task));
+        let demands = Demands { vias: &[], zones: self.mission.speed_zones() };
+        let certificate =
+            run.stage("certify", || certify::certify_through(&commands, self.robot, self.map, task, demands));
         Ok(Made { trajectory, profile, commands, certificate })
     }
 

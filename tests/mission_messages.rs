@@ -126,6 +126,9 @@ fn wrong_values() {
     mission("keep_out_two_corners", &map("keep_out: [{polygon_m: [[0, 0], [1, 0]]}]"));
     mission("box_upside_down", &map("boxes: [{min_m: [0, 0, 1], max_m: [1, 1, 0]}]"));
     mission("box_key", &map("boxes: [{min: [0, 0, 0], max_m: [1, 1, 1]}]"));
+    mission("zone_line", &map("speed_zones: [{polygon_m: [[0, 0], [1, 1], [2, 2]], speed_mps: 0.3}]"));
+    mission("zone_speed", &map("speed_zones: [{polygon_m: [[0, 0], [1, 0], [2, 2]], v_max_m_s: 0.3}]"));
+    mission("zone_zero", &map("speed_zones: [{polygon_m: [[0, 0], [1, 0], [2, 2]], speed_mps: 0}]"));
     mission("unknown_word", &with("map: {file: a.pcd, unknown: ocupied}"));
     mission("sampling_word", &with("sampling: traced"));
     mission("time_law_word", &with("time_law: fastest"));

@@ -15,6 +15,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 mod vias;
+mod zones;
 
 use rollout::Rollout;
 pub use series::{Instant, distances};
@@ -22,6 +23,7 @@ pub use series::{Instant, distances};
 use crate::command::CommandTable;
 use crate::geom::{Aabb, Pose2};
 use crate::map::VoxelMap;
+use crate::mission::SpeedZone;
 use crate::robot::RobotModel;
 
 /// Ends within this distance of the goal, m.
@@ -75,6 +77,24 @@ pub struct Via {
     pub dwell: f64,
 }
 
+/// What a mission asks of the way besides its end.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Demands<'a> {
+    /// Where the robot must stand, in this order.
+    pub vias: &'a [Via],
+    /// Where the base must be slow.
+    pub zones: &'a [SpeedZone],
+}
+
+/// How fast the base is in a speed zone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ZoneSpeed {
+    /// The zone's, m/s.
+    pub limit: f64,
+    /// Greatest speed of all rows that are not proven to keep out of it, m/s; `None`: all keep out.
+    pub peak: Option<f64>,
+}
+
 /// How a via was reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reached {
@@ -106,6 +126,8 @@ pub struct Certificate {
     pub end_heading_error: Option<f64>,
     /// Each via in order, as far as they were reached.
     pub vias: Vec<Reached>,
+    /// Each speed zone of the mission, in its order.
+    pub zones: Vec<ZoneSpeed>,
     /// Peaks of every actuator, as written.
     pub limits: Vec<LimitCheck>,
     /// Whether no limit (speed, acceleration, jerk, joint position) is exceeded.
@@ -158,6 +180,8 @@ pub enum RefusalKind {
     End,
     /// Does not stop at a via.
     Via,
+    /// Too fast in a speed zone.
+    Zone,
     /// The table contradicts itself or is not finite.
     Table,
 }
@@ -208,16 +232,16 @@ pub fn clearance_proven(table: &CommandTable, robot: &RobotModel, map: &VoxelMap
 /// A table that cannot be replayed (no rows, numbers that are not finite, joints that are not the robot's) is refused with
 /// [`RefusalKind::Table`] and without figures: errors infinite, no peaks, clearance zero.
 pub fn certify(table: &CommandTable, robot: &RobotModel, map: Option<&VoxelMap>, task: &Task) -> Certificate {
-    certify_through(table, robot, map, task, &[])
+    certify_through(table, robot, map, task, Demands::default())
 }
 
-/// The same, and that the robot stands at each of these places, in their order.
+/// The same, and that the robot stands at each of the demanded places, in their order, and drives slowly wherever it is to.
 pub fn certify_through(
     table: &CommandTable,
     robot: &RobotModel,
     map: Option<&VoxelMap>,
     task: &Task,
-    vias: &[Via],
+    demands: Demands<'_>,
 ) -> Certificate {
     let mut certificate = Certificate {
         clearance_required: map.map(|_| task.clearance),
@@ -228,6 +252,7 @@ pub fn certify_through(
         end_point_allowed: task.goal.allowed(),
         end_heading_error: task.goal.yaw.map(|_| f64::INFINITY),
         vias: Vec::new(),
+        zones: Vec::new(),
         limits: Vec::new(),
         limits_hold: false,
         refusals: table::unreadable(table, robot, task),
@@ -252,9 +277,12 @@ pub fn certify_through(
     certificate.end_point_error = ends.point;
     certificate.end_heading_error = ends.heading;
     certificate.refusals.extend(ends.refusals);
-    let (reached, missed) = vias::vias(&rollout, &table::standing(table), robot, vias);
+    let (reached, missed) = vias::vias(&rollout, &table::standing(table), robot, demands.vias);
     certificate.vias = reached;
     certificate.refusals.extend(missed);
+    let (speeds, too_fast) = zones::zones(&rollout, demands.zones);
+    certificate.zones = speeds;
+    certificate.refusals.extend(too_fast);
 
     if let Some((links, refusal)) = own_links::own_links(&rollout, robot) {
         certificate.own_links = Some(links);

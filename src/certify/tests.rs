@@ -6,3 +6,4 @@ mod own_links;
 pub(crate) mod peer;
 pub(crate) mod robots;
 mod vias;
+mod zones;

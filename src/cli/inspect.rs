@@ -133,6 +133,7 @@ fn of_map(args: &InspectArgs, path: &Path) -> Result<Understood, Diagnostics> {
         origin: None,
         keep_out: Vec::new(),
         boxes: Vec::new(),
+        speed_zones: Vec::new(),
     };
     let beside = file.beside.as_ref().map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
     let inputs = MapInputs { name: &file.name, bytes: &file.bytes, beside };

@@ -143,6 +143,7 @@ impl Products<'_> {
             map: world.and_then(|w| w.map.as_deref()),
             commands: outcome.compiled.as_ref().map(|c| &c.commands).or(outcome.traces.refused.as_ref()),
             ends: [mission.start.as_ref(), mission.goal.as_ref()],
+            zones: mission.speed_zones(),
             route: &outcome.traces.route,
         };
         match args.report {

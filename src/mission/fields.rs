@@ -92,7 +92,7 @@ pub(super) static MISSION: [Field; 14] = [
     Field::optional("path", Shape::Table(&PATH), "{file: path.csv}", "a given path instead of `map` and `goal`"),
 ];
 
-static MAP: [Field; 7] = [
+static MAP: [Field; 8] = [
     Field::required(
         "file",
         Shape::Text,
@@ -138,6 +138,16 @@ static MAP: [Field; 7] = [
         },
         "[{min_m: [2, 1, 0], max_m: [3, 2, 0.5]}]",
         "boxes that count as obstacles beside those of the file; `height_m` does not cut them",
+    ),
+    Field::optional(
+        "speed_zones",
+        Shape::List {
+            item: &super::zones::ZONE,
+            count: (0, 1000),
+            form: "a list of areas `{polygon_m: ..., speed_mps: ...}`",
+        },
+        "[{polygon_m: [[2, 1], [3, 1], [3, 2]], speed_mps: 0.3}]",
+        "areas in which the base drives no faster than their speed",
     ),
 ];
 

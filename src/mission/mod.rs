@@ -4,6 +4,7 @@ mod fields;
 pub(crate) mod limits;
 mod read;
 mod solids;
+mod zones;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -12,6 +13,7 @@ use std::sync::Arc;
 use crate::diag::{Diagnostics, Source, Span, json_schema};
 use crate::geom::Aabb;
 pub use solids::KeepOut;
+pub use zones::SpeedZone;
 
 /// A mission, as written plus defaults. File names are as written, relative to the mission's folder.
 #[derive(Debug, Clone, PartialEq)]
@@ -115,6 +117,15 @@ pub struct MapSpec {
     pub keep_out: Vec<KeepOut>,
     /// Boxes that count as obstacles, m.
     pub boxes: Vec<Aabb>,
+    /// Areas in which the base is slower.
+    pub speed_zones: Vec<SpeedZone>,
+}
+
+impl Mission {
+    /// Where the base must be slow.
+    pub fn speed_zones(&self) -> &[SpeedZone] {
+        self.map.as_ref().map_or(&[], |map| &map.speed_zones)
+    }
 }
 
 impl MapSpec {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::fields::{GOAL, MISSION, PARAMETERISATIONS, PATH, SAMPLING_LAWS, START, TIME_LAWS};
 use super::{
     MapSpec, Mission, MissionSpans, NamedJoint, Parameterisation, PathSpec, PoseSpec, Sampling, TimeLaw, Unknown,
-    ViaSpec, limits, solids,
+    ViaSpec, limits, solids, zones,
 };
 use crate::diag::shape::Field;
 use crate::diag::yaml::{Entry, Node};
@@ -84,6 +84,7 @@ fn map(node: &Node) -> MapSpec {
         origin: node.get("origin_m").and_then(numbers),
         keep_out: solids::keep_outs(node),
         boxes: solids::boxes(node),
+        speed_zones: zones::zones(node),
     }
 }
 
@@ -182,6 +183,7 @@ impl Between<'_> {
         self.start_file(&mut faults);
         if let Some(map) = self.root.get("map") {
             faults.extend(solids::check(self.source, map));
+            faults.extend(zones::check(self.source, map));
         }
         if let Some(height) = self.root.get("map").and_then(|m| m.get("height_m"))
             && let Some([low, high]) = numbers(height)

@@ -17,6 +17,7 @@ map:
   origin_m: [1, 2, 3]
   keep_out: [{polygon_m: [[0, 0], [1, 0], [1, 2]], height_m: [0.1, 0.5]}]
   boxes: [{min_m: [0, 1, 2], max_m: [3, 4, 5]}]
+  speed_zones: [{polygon_m: [[0, 0], [2, 0], [2, 3]], speed_mps: 0.25}]
 start: {x_m: 0.5, y_m: -0.5, yaw: 180deg, joints: {blade: 90deg, lift: 0.1}}
 goal: {x_m: 9.0, y_m: 8.0, within_m: 0.3, yaw: 1.5, joints: {blade: 0}}
 clearance_m: 0.1
@@ -74,6 +75,7 @@ fn every_key_is_read() {
         origin: Some([1.0, 2.0, 3.0]),
         keep_out: vec![KeepOut { polygon: vec![[0.0, 0.0], [1.0, 0.0], [1.0, 2.0]], height: Some([0.1, 0.5]) }],
         boxes: vec![Aabb { min: [0.0, 1.0, 2.0], max: [3.0, 4.0, 5.0] }],
+        speed_zones: vec![SpeedZone { polygon: vec![[0.0, 0.0], [2.0, 0.0], [2.0, 3.0]], speed: 0.25 }],
     };
     assert_eq!(mission.map, Some(map));
     let start = mission.start.expect("start");

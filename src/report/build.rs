@@ -4,7 +4,7 @@ use serde_json::{Map, Value, json};
 
 use super::schema::*;
 use super::{Metrics, Report, Status, names};
-use crate::certify::{Certificate, Closest, END_POINT_TOLERANCE, LimitCheck, Reached, Refusal, RefusalKind};
+use crate::certify::{Certificate, Closest, END_POINT_TOLERANCE, LimitCheck, Reached, Refusal, RefusalKind, ZoneSpeed};
 use crate::command::CommandTable;
 use crate::diag::{Diagnostics, Severity};
 use crate::map::VoxelMap;
@@ -80,6 +80,7 @@ fn refusal_kind(kind: RefusalKind) -> &'static str {
         RefusalKind::Reverse => "reverse",
         RefusalKind::End => "end",
         RefusalKind::Via => "via",
+        RefusalKind::Zone => "speed_zone",
         RefusalKind::Table => "table",
     }
 }
@@ -230,6 +231,7 @@ impl From<&Certificate> for CertificatePart {
             goal_within_m: Some(certificate.end_point_allowed).filter(|m| *m > END_POINT_TOLERANCE).and_then(finite),
             end_heading_error_rad: certificate.end_heading_error.and_then(finite),
             vias: certificate.vias.iter().filter_map(via).collect(),
+            speed_zones: certificate.zones.iter().filter_map(zone).collect(),
             limits_hold: certificate.limits_hold,
             closest: certificate.closest.as_ref().and_then(closest),
             own_links: certificate
@@ -245,6 +247,10 @@ fn via(reached: &Reached) -> Option<ViaPart> {
         point_error_m: finite(reached.point_error)?,
         heading_error_rad: reached.heading_error.and_then(finite),
     })
+}
+
+fn zone(zone: &ZoneSpeed) -> Option<ZonePart> {
+    Some(ZonePart { limit_mps: finite(zone.limit)?, peak_mps: zone.peak.and_then(finite) })
 }
 
 fn closest(closest: &Closest) -> Option<ClosestPart> {
@@ -287,6 +293,7 @@ mod tests {
             own_links: None,
             end_point_error: 4e-5,
             end_point_allowed: END_POINT_TOLERANCE,
+            zones: Vec::new(),
             end_heading_error: None,
             vias: Vec::new(),
             limits: vec![LimitCheck { actuator: "wheel_left".into(), quantity: "jerk", peak: 0.1, limit: None }],

@@ -275,6 +275,9 @@ pub struct CertificatePart {
     /// The mission's `via`, in order: each with the time at which the robot first stands there.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub vias: Vec<ViaPart>,
+    /// The mission's `map.speed_zones`, in order: each with the greatest speed in it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub speed_zones: Vec<ZonePart>,
     /// Whether no limit is exceeded.
     pub limits_hold: bool,
     /// The closest approach found.
@@ -295,6 +298,16 @@ pub struct ViaPart {
     /// rad; absent where the via leaves the heading open.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub heading_error_rad: Option<f64>,
+}
+
+/// A speed zone.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ZonePart {
+    /// Allowed there, m/s.
+    pub limit_mps: f64,
+    /// Greatest speed of the base at any instant there, m/s; absent: it is proven to keep out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub peak_mps: Option<f64>,
 }
 
 /// What was proven of the robot's links against each other.

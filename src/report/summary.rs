@@ -4,7 +4,7 @@ mod limits;
 
 use std::fmt::Write;
 
-use super::schema::{CertificatePart, LimitPart, Report, RobotPart, Status};
+use super::schema::{CertificatePart, LimitPart, Report, RobotPart, Status, ZonePart};
 use crate::certify::{END_ANGLE_TOLERANCE, END_POINT_TOLERANCE};
 pub use limits::table as limits_table;
 
@@ -78,6 +78,7 @@ fn failed(inputs: &SummaryInputs<'_>) -> String {
 pub fn proof(out: &mut String, certificate: &CertificatePart, peaks: &[LimitPart], robot: Option<&RobotPart>) {
     clearance(out, certificate);
     own_links(out, certificate, robot);
+    zones(out, certificate);
     goal(out, certificate);
     limits(out, peaks, robot);
 }
@@ -185,6 +186,22 @@ fn own_links(out: &mut String, certificate: &CertificatePart, robot: Option<&Rob
         None => left_out.trim_start_matches("; ").to_string(),
     };
     line(out, "own links", &said);
+}
+
+fn zones(out: &mut String, certificate: &CertificatePart) {
+    let said = zones_text(certificate);
+    if !said.is_empty() {
+        line(out, "slow zones", &said.join(", "));
+    }
+}
+
+/// How fast the base is in each speed zone, in words.
+pub fn zones_text(certificate: &CertificatePart) -> Vec<String> {
+    let zone = |zone: &ZonePart| match zone.peak_mps {
+        Some(peak) => format!("{}/{}{TIE}m/s", figure(peak), figure(zone.limit_mps)),
+        None => "not entered".replace(' ', TIE),
+    };
+    certificate.speed_zones.iter().map(zone).collect()
 }
 
 fn goal(out: &mut String, certificate: &CertificatePart) {

@@ -2,7 +2,7 @@ use nalgebra::Isometry3;
 
 use super::robots::*;
 use crate::certify::{
-    Certificate, END_ANGLE_TOLERANCE, END_POINT_TOLERANCE, Goal, RefusalKind, Task, Via, certify_through,
+    Certificate, Demands, END_ANGLE_TOLERANCE, END_POINT_TOLERANCE, Goal, RefusalKind, Task, Via, certify_through,
 };
 use crate::command::CommandTable;
 use crate::geom::Pose2;
@@ -11,7 +11,7 @@ use crate::robot::RobotModel;
 /// Drives 0.1 m along x in 1 s, stands for 0.3 s, drives as far again; a joint goes from 0 to 0.5 while it first drives.
 fn judged(vias: &[Via]) -> Certificate {
     let (robot, table, task) = motion();
-    certify_through(&table, &robot, None, &task, vias)
+    certify_through(&table, &robot, None, &task, Demands { vias, zones: &[] })
 }
 
 fn motion() -> (RobotModel, CommandTable, Task) {
@@ -90,7 +90,7 @@ fn a_goal_or_via_with_a_radius_is_the_disc_and_nothing_more() {
         assert_eq!(judged(&[Via { place: region(0.15), dwell: 0.0 }]).holds(), good);
         let (robot, table, mut task) = motion();
         task.goal = Goal { y: 0.03, ..region(0.16) };
-        let certificate = certify_through(&table, &robot, None, &task, &[]);
+        let certificate = certify_through(&table, &robot, None, &task, Demands::default());
         assert_eq!(certificate.holds(), good, "{:?}", certificate.refusals);
         assert!((certificate.end_point_error - 0.05).abs() < 1e-12);
         assert_eq!(certificate.refusals.iter().any(|r| r.message.contains("50.000 mm from the goal")), !good);

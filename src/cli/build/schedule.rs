@@ -48,7 +48,8 @@ pub fn map_key(mission: &Mission, path: &Path) -> Option<MapKey> {
         let folder = folder_of(Path::new(&mission.source.name));
         (tidy(&folder.join(&mission.robot)), &mission.limits)
     });
-    let MapSpec { file: _, resolution, height, unknown, origin, keep_out, boxes } = spec;
+    // Zones say nothing of cells.
+    let MapSpec { file: _, resolution, height, unknown, origin, keep_out, boxes, speed_zones: _ } = spec;
     Some(format!("{path:?} {resolution:?} {height:?} {unknown:?} {origin:?} {keep_out:?} {boxes:?} {robot:?}"))
 }
 

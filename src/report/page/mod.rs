@@ -23,7 +23,7 @@ use super::Report;
 use crate::certify::{self, Instant};
 use crate::command::CommandTable;
 use crate::map::VoxelMap;
-use crate::mission::PoseSpec;
+use crate::mission::{PoseSpec, SpeedZone};
 use crate::robot::{Convex, RobotModel};
 
 use html::{escape, fill, in_script};
@@ -63,6 +63,8 @@ pub struct PageInputs<'a> {
     pub commands: Option<&'a CommandTable>,
     /// Start and goal as the mission asks for them.
     pub ends: [Option<&'a PoseSpec>; 2],
+    /// Where the base is to be slow.
+    pub zones: &'a [SpeedZone],
     /// Places of the base on the search's path, m.
     pub route: &'a [[f64; 2]],
 }

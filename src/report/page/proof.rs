@@ -126,6 +126,13 @@ fn proven(inputs: &PageInputs<'_>, certificate: &CertificatePart) -> Vec<(String
         (false, _) => "a limit is passed".to_owned(),
     };
     out.push(("Limits".into(), escape(&limits)));
+    if !certificate.speed_zones.is_empty() {
+        let zones = crate::report::summary::zones_text(certificate).join(", ").replace('\u{a0}', " ");
+        out.push((
+            "Speed zones".into(),
+            escape(&format!("greatest speed at any instant in each, of what is allowed: {zones}")),
+        ));
+    }
     if !certificate.vias.is_empty() {
         let times: Vec<String> = certificate.vias.iter().map(|via| format!("{:.1} s", via.time_s)).collect();
         out.push(("Stops".into(), escape(&format!("at rest at each via: at {}", times.join(", ")))));

@@ -159,6 +159,7 @@ impl Case {
             map: self.map.as_ref(),
             commands: Some(&self.table),
             ends: [None, None],
+            zones: &[],
             route: &[[0.0, 0.0], [1.0, 1.0]],
         }
     }

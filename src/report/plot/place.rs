@@ -2,7 +2,7 @@
 
 use super::{TopView, top};
 use crate::geom::Pose2;
-use crate::mission::PoseSpec;
+use crate::mission::{PoseSpec, SpeedZone};
 use crate::robot::RobotModel;
 
 /// Corners of a circle as it is drawn.
@@ -28,6 +28,16 @@ pub fn stand(view: &mut TopView, robot: &RobotModel, pose: &PoseSpec, name: &str
     let joints = robot.joints.iter().zip(posture(robot, 0.5));
     let q: Vec<f64> = joints.map(|(joint, middle)| pose.joints.get(&joint.name).copied().unwrap_or(middle)).collect();
     view.end(robot, Pose2::new(x, y, pose.yaw.unwrap_or(0.0)), &q, name);
+}
+
+/// Draws the areas in which the base is to be slow, with their speeds.
+pub fn zones(view: &mut TopView, zones: &[SpeedZone]) {
+    for zone in zones {
+        view.area(zone.polygon.clone(), 4, "speed zone");
+        let count = zone.polygon.len() as f64;
+        let middle = [0, 1].map(|a| zone.polygon.iter().map(|p| p[a]).sum::<f64>() / count);
+        view.note(middle, format!("{} m/s", zone.speed));
+    }
 }
 
 /// Draws the places that a goal or via with `within_m` allows.

@@ -6,7 +6,7 @@ use crate::mission::TimeLaw;
 use crate::retime::RetimeError;
 use crate::retime::convolution::Convolution;
 use crate::retime::course::{Course, Curved};
-use crate::retime::limits::{Scope, append_turn, limits, planning};
+use crate::retime::limits::{Scope, append_turn, planning};
 use crate::retime::metric::Metric;
 use crate::retime::optimal::{self, Problem};
 use crate::retime::peaks::{HELD_JUMP, slow_down};
@@ -35,7 +35,8 @@ pub(super) fn time(curved: &Curved, task: Task<'_>) -> Result<TimedLeg, RetimeEr
 /// # Errors
 /// It was not found.
 pub(in crate::retime) fn paced(leg: TimedLeg, task: Task<'_>) -> Result<TimedLeg, RetimeError> {
-    let limits_of_rows = planning(task.robot);
+    let mut limits_of_rows = planning(task.robot);
+    task.zones.planning(&mut limits_of_rows);
     let problem = Problem {
         breaks: &leg.clock_breaks(),
         limits: &limits_of_rows,
@@ -46,12 +47,13 @@ pub(in crate::retime) fn paced(leg: TimedLeg, task: Task<'_>) -> Result<TimedLeg
         let first = out.len();
         leg.clock_rates(t, out);
         append_turn(task.robot, first, out);
+        task.zones.append(&leg, t, first, out);
     });
     let pace = pace.ok_or(RetimeError::NoOptimum { leg: task.leg })?;
     let leg = TimedLeg { clock: Clock::Paced(Box::new(leg.clock), pace), ..leg };
     // Between the points at which the law was made, limits are exceeded by a little.
     let peaks = peaks_of(&leg, task, Scope::Everything);
-    let stretch = slow_down(&peaks, &limits(task.robot, Scope::Everything), task.hold);
+    let stretch = slow_down(&peaks, &task.limits(Scope::Everything), task.hold);
     Ok(with_peak_speed(TimedLeg { stretch, ..leg }, &peaks, task))
 }
 
