@@ -65,12 +65,21 @@ pub fn unwrap_near(angle: f64, reference: f64) -> f64 {
 
 /// Distance from a point to the area that a closed polygon winds around, zero within it and on its edge; same unit as the corners.
 pub fn distance_to_area(p: [f64; 2], polygon: &[[f64; 2]]) -> f64 {
-    let (mut square, mut turns) = (f64::INFINITY, 0);
+    let foot = nearest_in_area(p, polygon);
+    (p[0] - foot[0]).hypot(p[1] - foot[1])
+}
+
+/// The point of the area that a closed polygon winds around that is nearest to a point: itself, within it.
+pub fn nearest_in_area(p: [f64; 2], polygon: &[[f64; 2]]) -> [f64; 2] {
+    let (mut nearest, mut turns) = ((f64::INFINITY, p), 0);
     for (a, b) in polygon.iter().zip(polygon.iter().cycle().skip(1)) {
         let (side, off) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
         let length = side[0] * side[0] + side[1] * side[1];
         let along = if length > 0.0 { (off[0] * side[0] + off[1] * side[1]) / length } else { 0.0 }.clamp(0.0, 1.0);
-        square = f64::min(square, (off[0] - along * side[0]).powi(2) + (off[1] - along * side[1]).powi(2));
+        let square = (off[0] - along * side[0]).powi(2) + (off[1] - along * side[1]).powi(2);
+        if square < nearest.0 {
+            nearest = (square, [a[0] + along * side[0], a[1] + along * side[1]]);
+        }
         // Crossings of the ray from the point along x, upwards counted up (Sunday's winding number).
         let left = side[0] * off[1] - off[0] * side[1];
         if a[1] <= p[1] && b[1] > p[1] && left > 0.0 {
@@ -79,7 +88,7 @@ pub fn distance_to_area(p: [f64; 2], polygon: &[[f64; 2]]) -> f64 {
             turns -= 1;
         }
     }
-    if turns == 0 { square.sqrt() } else { 0.0 }
+    if turns == 0 { nearest.1 } else { p }
 }
 
 /// An axis-aligned box, `min <= max` on every axis, in metres.

@@ -135,6 +135,7 @@ pub(super) fn optimise(
         let usual = if compile.spins { OptimizeOptions::default() } else { OptimizeOptions::without_spins() };
         let clearance = mission.clearance + margin;
         let mut options = OptimizeOptions { parameterisation, clearance, dense: compile.dense, ..usual };
+        options.zones = mission.speed_zones().to_vec();
         if look != Look::First {
             options.steer = options.steer.closer();
             options.clearance += MISSED_TIMES * missed;

@@ -158,6 +158,7 @@ fn scene(inputs: &PageInputs<'_>, distances: Option<&Distances>) -> (scene::Scen
         closest: inputs.report.certificate.as_ref().and_then(|c| c.closest.clone()),
         places,
         gap,
+        zones: inputs.zones.iter().map(|z| scene::Zone { corners: z.polygon.clone(), speed: z.speed }).collect(),
         route: inputs.route.iter().map(|p| p.map(|v| (v * 1e4).round() / 1e4)).collect(),
     };
     (out, factor.unwrap_or(1))
