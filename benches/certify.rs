@@ -102,7 +102,7 @@ fn commands(robot: &RobotModel) -> (CommandTable, Task) {
         pose = pose.after_twist(speed, turn, table.sampling_time);
         angle += rate * table.sampling_time;
     }
-    let goal = Goal { x: pose.x, y: pose.y, yaw: Some(pose.yaw), joints: vec![None] };
+    let goal = Goal { x: pose.x, y: pose.y, within: 0.0, yaw: Some(pose.yaw), joints: vec![None] };
     (table, Task { start, start_joints: vec![0.0], goal, clearance: 0.05, reverse: false })
 }
 

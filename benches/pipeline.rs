@@ -54,7 +54,7 @@ impl Bench {
     fn search(&self, field: &Esdf) -> SearchPath {
         let (start, start_joints) = self.pose(&self.mission.start);
         let (goal, goal_joints) = self.pose(&self.mission.goal);
-        let query = Query { start, start_joints, goal, goal_yaw: Some(goal.yaw), goal_joints };
+        let query = Query { start, start_joints, goal, goal_within: 0.0, goal_yaw: Some(goal.yaw), goal_joints };
         let clearance = self.mission.clearance + SEARCH_MARGIN;
         let options = SearchOptions { clearance, reverse: self.mission.reverse };
         search::search(self.map(), field, self.robot(), &query, &options).expect("there is a way")
@@ -79,7 +79,7 @@ impl Bench {
         let task = Task {
             start: first.pose,
             start_joints: first.joints.clone(),
-            goal: Goal { x: goal.x, y: goal.y, yaw: Some(goal.yaw), joints },
+            goal: Goal { x: goal.x, y: goal.y, within: 0.0, yaw: Some(goal.yaw), joints },
             clearance: self.mission.clearance,
             reverse: self.mission.reverse,
         };

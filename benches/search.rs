@@ -48,7 +48,7 @@ impl Bench {
         let joints = |p: &PoseSpec| robot.joints.iter().map(|j| p.joints.get(&j.name).copied()).collect();
         let (start, goal) = (pose(&scene.start), pose(&scene.goal));
         let [start_joints, goal_joints] = [joints(&scene.start), joints(&scene.goal)];
-        (map, field, Query { start, start_joints, goal, goal_yaw: Some(goal.yaw), goal_joints })
+        (map, field, Query { start, start_joints, goal, goal_within: 0.0, goal_yaw: Some(goal.yaw), goal_joints })
     }
 
     fn search(&self, k: usize) -> Result<SearchPath, SearchError> {

@@ -104,6 +104,7 @@ fn row(side: f64, density: f64, arms: usize) {
         start: Pose2::new(1.0, 1.0, 0.0),
         start_joints: vec![None; arms],
         goal: Pose2::new(side - 1.0, side - 1.0, 0.0),
+        goal_within: 0.0,
         goal_yaw: None,
         goal_joints: vec![None; arms],
     };

@@ -63,6 +63,34 @@ pub fn unwrap_near(angle: f64, reference: f64) -> f64 {
     reference + wrap_angle(angle - reference)
 }
 
+/// Distance from a point to the area that a closed polygon winds around, zero within it and on its edge; same unit as the corners.
+pub fn distance_to_area(p: [f64; 2], polygon: &[[f64; 2]]) -> f64 {
+    let foot = nearest_in_area(p, polygon);
+    (p[0] - foot[0]).hypot(p[1] - foot[1])
+}
+
+/// The point of the area that a closed polygon winds around that is nearest to a point: itself, within it.
+pub fn nearest_in_area(p: [f64; 2], polygon: &[[f64; 2]]) -> [f64; 2] {
+    let (mut nearest, mut turns) = ((f64::INFINITY, p), 0);
+    for (a, b) in polygon.iter().zip(polygon.iter().cycle().skip(1)) {
+        let (side, off) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
+        let length = side[0] * side[0] + side[1] * side[1];
+        let along = if length > 0.0 { (off[0] * side[0] + off[1] * side[1]) / length } else { 0.0 }.clamp(0.0, 1.0);
+        let square = (off[0] - along * side[0]).powi(2) + (off[1] - along * side[1]).powi(2);
+        if square < nearest.0 {
+            nearest = (square, [a[0] + along * side[0], a[1] + along * side[1]]);
+        }
+        // Crossings of the ray from the point along x, upwards counted up (Sunday's winding number).
+        let left = side[0] * off[1] - off[0] * side[1];
+        if a[1] <= p[1] && b[1] > p[1] && left > 0.0 {
+            turns += 1;
+        } else if a[1] > p[1] && b[1] <= p[1] && left < 0.0 {
+            turns -= 1;
+        }
+    }
+    if turns == 0 { nearest.1 } else { p }
+}
+
 /// An axis-aligned box, `min <= max` on every axis, in metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Aabb {
@@ -81,5 +109,50 @@ impl Aabb {
     /// Distance from a point to the box, zero inside, in metres.
     pub fn distance(&self, p: &Point3<f64>) -> f64 {
         (0..3).map(|i| (self.min[i] - p[i]).max(p[i] - self.max[i]).max(0.0).powi(2)).sum::<f64>().sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn an_area_is_what_a_polygon_winds_around() {
+        // A square that is entered by a notch from above, written clockwise.
+        let notched = [[0.0, 0.0], [0.0, 2.0], [0.8, 2.0], [1.0, 0.5], [1.2, 2.0], [2.0, 2.0], [2.0, 0.0]];
+        for (p, distance) in [
+            ([1.0, 0.4], 0.0),
+            ([1.0, 0.5], 0.0),
+            ([0.1, 1.9], 0.0),
+            ([2.0, 1.0], 0.0),
+            ([3.0, 1.0], 1.0),
+            ([-3.0, -4.0], 5.0),
+            // In the notch: 0.15 m from both of its sides, which rise 1.5 m in 0.2 m.
+            ([1.0, 1.625], 0.15 / 1.5f64.hypot(0.2) * 1.5),
+        ] {
+            assert!(
+                (distance_to_area(p, &notched) - distance).abs() < 1e-12,
+                "{p:?}: {}",
+                distance_to_area(p, &notched)
+            );
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_distance_to_a_box_as_a_polygon_is_that_to_the_box(
+            low in [-2.0..0.0f64, -2.0..0.0], size in [0.01..2.0f64, 0.01..2.0], p in [-4.0..4.0f64, -4.0..4.0], first in 0usize..4, back in any::<bool>(),
+        ) {
+            let high = [low[0] + size[0], low[1] + size[1]];
+            let mut corners = vec![low, [high[0], low[1]], high, [low[0], high[1]]];
+            corners.rotate_left(first);
+            if back {
+                corners.reverse();
+            }
+            let aabb = Aabb { min: [low[0], low[1], 0.0], max: [high[0], high[1], 0.0] };
+            let expected = aabb.distance(&Point3::new(p[0], p[1], 0.0));
+            prop_assert!((distance_to_area(p, &corners) - expected).abs() < 1e-12);
+        }
     }
 }

@@ -77,6 +77,7 @@
 //!     urdf: file("box.urdf", urdf),
 //!     map: Some(MapFile { name: "floor.csv".into(), bytes: points.into_bytes(), beside: None }),
 //!     path_csv: None,
+//!     start_file: None,
 //!     files: Box::new(NoFiles),
 //! };
 //!

@@ -15,7 +15,7 @@ pub use world::world;
 
 use std::time::Instant;
 
-use crate::certify::{self, Certificate, Goal, RefusalKind, Task, Trust, Via};
+use crate::certify::{self, Certificate, Demands, Goal, RefusalKind, Task, Trust, Via};
 use crate::command::{self, CommandTable, SampleOptions};
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::geom::{Pose2, wrap_angle};
@@ -48,6 +48,17 @@ pub struct MapFile {
     pub beside: Option<(String, Vec<u8>)>,
 }
 
+/// A command file that was read, where whose motion ends another one starts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StartFile {
+    /// Path as the user knows it.
+    pub name: String,
+    /// All of it.
+    pub bytes: Vec<u8>,
+    /// Its commands.
+    pub table: CommandTable,
+}
+
 /// Everything a mission names, read. (`cli` reads; no stage opens a file but meshes through `files`.)
 pub struct Inputs {
     /// Parsed.
@@ -64,6 +75,8 @@ pub struct Inputs {
     pub map: Option<MapFile>,
     /// `path: {file}`.
     pub path_csv: Option<TextFile>,
+    /// `start: {file}`.
+    pub start_file: Option<StartFile>,
     /// Reader for meshes.
     pub files: Box<dyn Files>,
 }
@@ -315,7 +328,9 @@ impl Finish<'_> {
     /// The same of a task that is not the mission's.
     fn certify_task(&self, run: &mut Run<'_>, trajectory: Trajectory, task: &Task) -> Result<Made, Diagnostics> {
         let (profile, commands) = self.commands(run, &trajectory)?;
-        let certificate = run.stage("certify", || certify::certify(&commands, self.robot, self.map, task));
+        let demands = Demands { vias: &[], zones: self.mission.speed_zones() };
+        let certificate =
+            run.stage("certify", || certify::certify_through(&commands, self.robot, self.map, task, demands));
         Ok(Made { trajectory, profile, commands, certificate })
     }
 
@@ -326,7 +341,8 @@ impl Finish<'_> {
         trajectory: &Trajectory,
     ) -> Result<(MotionProfile, CommandTable), Diagnostics> {
         let options = RetimeOptions { law: self.law(trajectory), sampling_time: self.sampling_time };
-        let profile = run.stage("retime", || retime::retime(trajectory, self.robot, &options))?;
+        let profile =
+            run.stage("retime", || retime::retime_in(trajectory, self.robot, &options, self.mission.speed_zones()))?;
         let options = SampleOptions { sampling_time: self.sampling_time, sampling: self.mission.sampling };
         let commands = run.stage("command", || command::sample(&profile, self.robot, &options))?;
         Ok((profile, commands))
@@ -421,6 +437,7 @@ fn goal(mission: &Mission, robot: &RobotModel, given_end: Option<Pose2>) -> Goal
     Goal {
         x: of(|g| g.x, |end| end.x).unwrap_or_default(),
         y: of(|g| g.y, |end| end.y).unwrap_or_default(),
+        within: asked.map_or(0.0, |g| g.within),
         yaw: of(|g| g.yaw, |end| end.yaw),
         joints: robot.joints.iter().map(|j| asked.and_then(|g| g.joints.get(&j.name).copied())).collect(),
     }
@@ -431,6 +448,7 @@ fn place_of(place: &PoseSpec, robot: &RobotModel) -> Goal {
     Goal {
         x: place.x.unwrap_or_default(),
         y: place.y.unwrap_or_default(),
+        within: place.within,
         yaw: place.yaw,
         joints: robot.joints.iter().map(|joint| place.joints.get(&joint.name).copied()).collect(),
     }
@@ -469,10 +487,11 @@ fn given_path(
     for (which, spec, own, span) in ends {
         let Some(spec) = spec else { continue };
         let off = |a: Option<f64>, b: f64| a.is_some_and(|a| (a - b).abs() > 1e-6);
-        if off(spec.x, own.x)
-            || off(spec.y, own.y)
-            || spec.yaw.is_some_and(|yaw| wrap_angle(yaw - own.yaw).abs() > 1e-6)
-        {
+        let elsewhere = match spec.x.zip(spec.y) {
+            Some((x, y)) if spec.within > 0.0 => (x - own.x).hypot(y - own.y) > spec.within,
+            _ => off(spec.x, own.x) || off(spec.y, own.y),
+        };
+        if elsewhere || spec.yaw.is_some_and(|yaw| wrap_angle(yaw - own.yaw).abs() > 1e-6) {
             let message = format!(
                 "`{which}` contradicts the given path, which has x {:.6}, y {:.6}, heading {:.6} rad there",
                 own.x, own.y, own.yaw
@@ -556,6 +575,7 @@ pub fn inputs_part(inputs: &Inputs) -> InputsPart {
     if inputs.robot_yaml.is_some() {
         other.push(file(&inputs.urdf.name, inputs.urdf.text.as_bytes()));
     }
+    other.extend(inputs.start_file.iter().map(|f| file(&f.name, &f.bytes)));
     other.extend(inputs.path_csv.iter().map(|f| file(&f.name, f.text.as_bytes())));
     let map = inputs.map.as_ref();
     other.extend(map.and_then(|m| m.beside.as_ref()).map(|(name, bytes)| file(name, bytes)));

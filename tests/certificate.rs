@@ -140,7 +140,7 @@ fn brute_force(robot: &RobotModel, stretch: &Stretch, cube: &Aabb, enough: f64) 
 /// The proof of a stretch; only its clearance matters.
 fn proof(compiled: &Compiled, stretch: &Stretch, map: &VoxelMap, clearance: f64) -> Certificate {
     let (start, start_joints) = stretch.states[0].clone();
-    let goal = Goal { x: start.x, y: start.y, yaw: None, joints: vec![None; start_joints.len()] };
+    let goal = Goal { x: start.x, y: start.y, within: 0.0, yaw: None, joints: vec![None; start_joints.len()] };
     certify(&stretch.table, &compiled.robot, Some(map), &Task { start, start_joints, goal, clearance, reverse: false })
 }
 

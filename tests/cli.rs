@@ -9,6 +9,8 @@ mod alone;
 mod bad_input;
 #[path = "cli/bad_maps_and_robots.rs"]
 mod bad_maps_and_robots;
+#[path = "cli/chain.rs"]
+mod chain;
 #[path = "cli/check.rs"]
 mod check;
 #[path = "cli/compile.rs"]

@@ -86,6 +86,7 @@ fn inputs(n: usize) -> Inputs {
         urdf: file("serial.urdf", &urdf(n)),
         map: Some(MapFile { name: "floor.csv".into(), bytes: points.into_bytes(), beside: None }),
         path_csv: None,
+        start_file: None,
         files: Box::new(NoFiles),
     }
 }
@@ -125,6 +126,7 @@ fn goes_round_the_post_and_bends(n: usize) {
         urdf: &inputs.urdf.text,
         report: &report,
         path_csv: None,
+        start_file: None,
         meshes: &[],
     })
     .expect("finite");

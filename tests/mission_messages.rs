@@ -93,6 +93,10 @@ fn wrong_keys() {
     mission("no_value", &with("goal:"));
     mission("no_space_in_braces", &with("goal: {x_m:9.0, y_m: 8.0}"));
     mission("decimal_comma", &with("goal: {x_m: 9,5, y_m: 8.0}"));
+    mission("goal_radius", &with("goal: {x_m: 9.0, y_m: 8.0, radius_m: 0.3, yaw: 90deg}"));
+    mission("start_file_and_joints", &with("start: {file: ../out/b/commands.csv, yaw: 0, joints: {blade: 0}}"));
+    mission("start_file_and_path", "robot: r.yaml\nstart: {file: c.csv}\npath: {file: a.csv}\n");
+    mission("start_file_number", &with("start: {file: 3}"));
     mission("via", &with("via: {x_m: 4.0, y_m: 4.0}"));
     mission("via_keys", &with("via: [{x_m: 4.0, dwell: 2}]"));
     mission("via_dwell", &with("via: [{x_m: 4.0, y_m: 4.0, dwell_s: -1}]"));
@@ -122,11 +126,17 @@ fn wrong_values() {
     mission("keep_out_two_corners", &map("keep_out: [{polygon_m: [[0, 0], [1, 0]]}]"));
     mission("box_upside_down", &map("boxes: [{min_m: [0, 0, 1], max_m: [1, 1, 0]}]"));
     mission("box_key", &map("boxes: [{min: [0, 0, 0], max_m: [1, 1, 1]}]"));
+    mission("zone_line", &map("speed_zones: [{polygon_m: [[0, 0], [1, 1], [2, 2]], speed_mps: 0.3}]"));
+    mission("zone_speed", &map("speed_zones: [{polygon_m: [[0, 0], [1, 0], [2, 2]], v_max_m_s: 0.3}]"));
+    mission("zone_zero", &map("speed_zones: [{polygon_m: [[0, 0], [1, 0], [2, 2]], speed_mps: 0}]"));
     mission("unknown_word", &with("map: {file: a.pcd, unknown: ocupied}"));
     mission("sampling_word", &with("sampling: traced"));
     mission("time_law_word", &with("time_law: fastest"));
     mission("flag", &with("reverse: yes"));
     mission("list_for_table", &with("start: [0.5, 0.5, 0]"));
+    mission("goal_within_zero", &with("goal: {x_m: 9.0, y_m: 8.0, within_m: 0}"));
+    mission("goal_yaw_word", &with("goal: {x_m: 9.0, y_m: 8.0, yaw: free}"));
+    mission("start_yaw_any", &with("start: {x_m: 9.0, y_m: 8.0, yaw: any}"));
     mission("angle_degree_sign", &with("start: {x_m: 0.5, y_m: 0.5, yaw: 90°}"));
     mission("angle_space", &with("start: {x_m: 0.5, y_m: 0.5, yaw: 90 deg}"));
     mission("angle_pi", &with("start: {x_m: 0.5, y_m: 0.5, yaw: pi/2}"));

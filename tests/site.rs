@@ -51,7 +51,7 @@ fn under_the_tape(robot: &RobotModel, blade: f64) -> (CommandTable, Task) {
         joints: vec![("blade".into(), false)],
         rows,
     };
-    let goal = Goal { x: pose.x, y: pose.y, yaw: Some(pose.yaw), joints: vec![Some(blade)] };
+    let goal = Goal { x: pose.x, y: pose.y, within: 0.0, yaw: Some(pose.yaw), joints: vec![Some(blade)] };
     (table, Task { start, start_joints: vec![blade], goal, clearance: CLEARANCE, reverse: false })
 }
 

@@ -27,8 +27,8 @@ pub(super) fn ends(rollout: &Rollout<'_>, robot: &RobotModel, goal: &Goal) -> En
             refusals.push(Refusal { kind: RefusalKind::End, message: message(), time: Some(rollout.time(last, 0.0)) });
         }
     };
-    refuse(point, END_POINT_TOLERANCE, &|| {
-        let (got, allowed) = (1e3 * point, 1e3 * END_POINT_TOLERANCE);
+    refuse(point, goal.allowed(), &|| {
+        let (got, allowed) = (1e3 * point, 1e3 * goal.allowed());
         format!("ends {got:.3} mm from the goal ({allowed:.0} mm allowed)")
     });
     if let Some(error) = heading {

@@ -17,6 +17,7 @@ mod tests;
 mod trust;
 mod tube;
 mod vias;
+mod zones;
 
 use rollout::Rollout;
 pub use series::{Instant, distances};
@@ -26,7 +27,7 @@ pub use tube::{Shares, Width};
 use crate::command::CommandTable;
 use crate::geom::{Aabb, Pose2};
 use crate::map::VoxelMap;
-use crate::mission::Tolerance;
+use crate::mission::{SpeedZone, Tolerance};
 use crate::robot::RobotModel;
 
 /// Ends within this distance of the goal, m.
@@ -56,10 +57,19 @@ pub struct Goal {
     pub x: f64,
     /// m.
     pub y: f64,
+    /// How far from there will do, m; [`END_POINT_TOLERANCE`] where that is more.
+    pub within: f64,
     /// rad.
     pub yaw: Option<f64>,
     /// One per moving joint.
     pub joints: Vec<Option<f64>>,
+}
+
+impl Goal {
+    /// How far from its point a motion may end, m.
+    pub fn allowed(&self) -> f64 {
+        self.within.max(END_POINT_TOLERANCE)
+    }
 }
 
 /// A place on the way at which the robot must stand.
@@ -69,6 +79,24 @@ pub struct Via {
     pub place: Goal,
     /// For how long at least, s; 0: at one row, at rest.
     pub dwell: f64,
+}
+
+/// What a mission asks of the way besides its end.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Demands<'a> {
+    /// Where the robot must stand, in this order.
+    pub vias: &'a [Via],
+    /// Where the base must be slow.
+    pub zones: &'a [SpeedZone],
+}
+
+/// How fast the base is in a speed zone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ZoneSpeed {
+    /// The zone's, m/s.
+    pub limit: f64,
+    /// Greatest speed of all rows that are not proven to keep out of it, m/s; `None`: all keep out.
+    pub peak: Option<f64>,
 }
 
 /// How a via was reached.
@@ -96,12 +124,16 @@ pub struct Certificate {
     pub tolerance: Option<InTube>,
     /// The robot's links against each other; `None` where none that are checked move against each other.
     pub own_links: Option<OwnLinks>,
-    /// m.
+    /// From the goal's point, m.
     pub end_point_error: f64,
+    /// What that may be, m: [`END_POINT_TOLERANCE`], or the radius of the goal's region.
+    pub end_point_allowed: f64,
     /// rad; `None` where the goal leaves the heading open.
     pub end_heading_error: Option<f64>,
     /// Each via in order, as far as they were reached.
     pub vias: Vec<Reached>,
+    /// Each speed zone of the mission, in its order.
+    pub zones: Vec<ZoneSpeed>,
     /// Peaks of every actuator, as written.
     pub limits: Vec<LimitCheck>,
     /// Whether no limit (speed, acceleration, jerk, joint position) is exceeded.
@@ -171,6 +203,8 @@ pub enum RefusalKind {
     End,
     /// Does not stop at a via.
     Via,
+    /// Too fast in a speed zone.
+    Zone,
     /// The table contradicts itself or is not finite.
     Table,
 }
@@ -221,16 +255,16 @@ pub fn clearance_proven(table: &CommandTable, robot: &RobotModel, map: &VoxelMap
 /// A table that cannot be replayed (no rows, numbers that are not finite, joints that are not the robot's) is refused with
 /// [`RefusalKind::Table`] and without figures: errors infinite, no peaks, clearance zero.
 pub fn certify(table: &CommandTable, robot: &RobotModel, map: Option<&VoxelMap>, task: &Task) -> Certificate {
-    certify_through(table, robot, map, task, &[])
+    certify_through(table, robot, map, task, Demands::default())
 }
 
-/// The same, and that the robot stands at each of these places, in their order.
+/// The same, and that the robot stands at each of the demanded places, in their order, and drives slowly wherever it is to.
 pub fn certify_through(
     table: &CommandTable,
     robot: &RobotModel,
     map: Option<&VoxelMap>,
     task: &Task,
-    vias: &[Via],
+    demands: Demands<'_>,
 ) -> Certificate {
     let mut certificate = Certificate {
         clearance_required: map.map(|_| task.clearance),
@@ -239,8 +273,10 @@ pub fn certify_through(
         tolerance: None,
         own_links: None,
         end_point_error: f64::INFINITY,
+        end_point_allowed: task.goal.allowed(),
         end_heading_error: task.goal.yaw.map(|_| f64::INFINITY),
         vias: Vec::new(),
+        zones: Vec::new(),
         limits: Vec::new(),
         limits_hold: false,
         refusals: table::unreadable(table, robot, task),
@@ -265,9 +301,12 @@ pub fn certify_through(
     certificate.end_point_error = ends.point;
     certificate.end_heading_error = ends.heading;
     certificate.refusals.extend(ends.refusals);
-    let (reached, missed) = vias::vias(&rollout, &table::standing(table), robot, vias);
+    let (reached, missed) = vias::vias(&rollout, &table::standing(table), robot, demands.vias);
     certificate.vias = reached;
     certificate.refusals.extend(missed);
+    let (speeds, too_fast) = zones::zones(&rollout, demands.zones);
+    certificate.zones = speeds;
+    certificate.refusals.extend(too_fast);
 
     if let Some((links, refusal)) = own_links::own_links(&rollout, robot) {
         certificate.own_links = Some(links);

@@ -69,7 +69,8 @@ pub(super) fn unreadable(table: &CommandTable, robot: &RobotModel, task: &Task) 
     let joints = robot.joints.len();
     let task_fits = task.start_joints.len() == joints && task.goal.joints.len() == joints;
     fault(!task_fits, &|| format!("the task's start or goal does not have {joints} joint values"), None);
-    let task_numbers = [task.start.x, task.start.y, task.start.yaw, task.goal.x, task.goal.y, task.clearance];
+    let Task { start, goal, clearance, .. } = task;
+    let task_numbers = [start.x, start.y, start.yaw, goal.x, goal.y, goal.within, *clearance];
     let task_fine = task_numbers.into_iter().chain(task.goal.yaw).chain(task.start_joints.iter().copied());
     let task_fine = task_fine.chain(task.goal.joints.iter().copied().flatten()).all(fine);
     fault(!task_fine, &|| format!("the task has a number that is not finite or beyond {LARGEST:e}"), None);

@@ -7,3 +7,4 @@ pub(crate) mod peer;
 pub(crate) mod robots;
 mod tube;
 mod vias;
+mod zones;

@@ -69,7 +69,7 @@ fn stand(
     }
     Err(match longest {
         Some(stood) => format!("it stands there for {stood:.3} s, {:.3} s are asked for", via.dwell),
-        None if within(nearest, END_POINT_TOLERANCE) => "it stands there with another heading or other joints".into(),
+        None if within(nearest, via.place.allowed()) => "it stands there with another heading or other joints".into(),
         None if nearest.is_finite() => format!("its nearest stop after that is {:.3} mm away", 1e3 * nearest),
         None => "it does not stop any more".into(),
     })
@@ -78,7 +78,7 @@ fn stand(
 /// Whether the robot is in a place as the certificate understands a goal, when a row begins.
 fn as_said(rollout: &Rollout<'_>, row: usize, robot: &RobotModel, place: &Goal) -> bool {
     let pose = rollout.pose(row, 0.0);
-    let point = within((pose.x - place.x).hypot(pose.y - place.y), END_POINT_TOLERANCE);
+    let point = within((pose.x - place.x).hypot(pose.y - place.y), place.allowed());
     let heading = place.yaw.is_none_or(|yaw| within(wrap_angle(pose.yaw - yaw).abs(), END_ANGLE_TOLERANCE));
     let joints = robot.joints.iter().zip(&place.joints).zip(rollout.joints(row)).all(|((joint, wanted), value)| {
         let tolerance = if joint.prismatic { END_POINT_TOLERANCE } else { END_ANGLE_TOLERANCE };

@@ -4,6 +4,7 @@ mod document;
 mod find;
 mod hashes;
 mod make;
+mod order;
 mod schedule;
 mod state;
 mod work;
@@ -23,6 +24,7 @@ use document::{Document, Row, RowStatus};
 use find::Found;
 use hashes::Hashes;
 use make::Site;
+use order::Order;
 use schedule::{Job, Schedule, map_key};
 use state::{Ended, Making, Reason, Stale, State};
 use work::{Event, Finished, work};
@@ -66,8 +68,8 @@ pub struct BuildArgs {
 
 /// What is known of a mission before anything is compiled.
 enum Plan {
-    /// Its folder holds.
-    Keep(Ended),
+    /// Its folder holds; and what was read for it.
+    Keep(Ended, Vec<PathBuf>),
     /// It is to be compiled.
     Make(Vec<Stale>),
 }
@@ -80,7 +82,7 @@ enum Plan {
 pub fn build(args: &BuildArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics> {
     let start = std::env::current_dir().unwrap_or_else(|_| PathBuf::from("."));
     let out = &args.products.out;
-    let missions = find::find(&args.paths, &start, out)?;
+    let mut missions = find::find(&args.paths, &start, out)?;
     let _lock = if args.dry_run {
         None
     } else {
@@ -91,15 +93,26 @@ pub fn build(args: &BuildArgs, terminal: &mut Terminal) -> Result<u8, Diagnostic
     };
     let hashes = Arc::new(Hashes::load(&start, out));
     let making = Making::new(&args.products, &hashes);
-    let plans: Vec<Plan> = missions.iter().map(|mission| plan(args, mission, &start, &making, &hashes)).collect();
+    let mut plans: Vec<Plan> = missions.iter().map(|mission| plan(args, mission, &start, &making, &hashes)).collect();
+    let reads: Vec<Vec<PathBuf>> = missions.iter().zip(&plans).map(|(m, plan)| reads(m, plan, &start)).collect();
+    let order = order::order(&missions, &reads, &out_folders(&missions, out, &start))?;
+    (missions, plans) = (order.sorted(missions), order.sorted(plans));
+    for (index, before) in order.after.iter().enumerate() {
+        if let Some((first, file)) = before
+            && matches!((&plans[*first], &plans[index]), (Plan::Make(_), Plan::Keep(..)))
+        {
+            plans[index] = Plan::Make(vec![Stale::After(file.clone())]);
+        }
+    }
     let mut rows: Vec<Row> = missions.iter().zip(&plans).map(|(mission, plan)| row(out, mission, plan)).collect();
-    let jobs = jobs(args, &mut rows);
+    let jobs = jobs(args, &mut rows, &order);
     if !args.dry_run {
         for job in &jobs {
             rows[job.index].status = RowStatus::NotTried;
         }
         let total = jobs.len();
-        let jobs = jobs.iter().map(|job| Job { map: shared_map(&missions[job.index]), ..*job }).collect();
+        let with_map = |job: Job| Job { map: shared_map(&missions[job.index]), ..job };
+        let jobs = jobs.into_iter().map(with_map).collect();
         let schedule = Schedule::new(jobs);
         let site = Site { args: &args.products, start, making, hashes: hashes.clone(), schedule };
         compile(args, &site, total, &missions, &mut rows, terminal);
@@ -119,7 +132,11 @@ fn plan(args: &BuildArgs, mission: &Found, start: &Path, making: &Making, hashes
     }
     let Some(state) = State::read(&folder) else { return Plan::Make(vec![Stale::New]) };
     let why = state.stale(&mission.path, &folder, start, making, hashes);
-    if why.is_empty() { Plan::Keep(state.ended) } else { Plan::Make(why) }
+    if why.is_empty() {
+        Plan::Keep(state.ended.clone(), state.reads().map(Path::to_path_buf).collect())
+    } else {
+        Plan::Make(why)
+    }
 }
 
 fn row(out: &Path, mission: &Found, plan: &Plan) -> Row {
@@ -137,8 +154,8 @@ fn row(out: &Path, mission: &Found, plan: &Plan) -> Row {
     };
     match plan {
         Plan::Make(why) => row.why = why.iter().map(Stale::to_string).collect(),
-        Plan::Keep(ended) if ended.status == Status::Certified => row.end(RowStatus::UpToDate, ended.clone()),
-        Plan::Keep(ended) => {
+        Plan::Keep(ended, _) if ended.status == Status::Certified => row.end(RowStatus::UpToDate, ended.clone()),
+        Plan::Keep(ended, _) => {
             row.end(RowStatus::FailedBefore, ended.clone());
             // Bad input is not remembered.
             row.exit_code = 1;
@@ -148,18 +165,36 @@ fn row(out: &Path, mission: &Found, plan: &Plan) -> Row {
 }
 
 /// What is to be compiled. A failure that is known already ends the list as a new one does.
-fn jobs(args: &BuildArgs, rows: &mut [Row]) -> Vec<Job> {
+fn jobs(args: &BuildArgs, rows: &mut [Row], order: &Order) -> Vec<Job> {
     let mut jobs = Vec::new();
     let mut stopped = false;
     for (index, row) in rows.iter_mut().enumerate() {
         match row.status {
             RowStatus::FailedBefore => stopped |= !args.keep_going,
             RowStatus::ToCompile if stopped => row.status = RowStatus::NotTried,
-            RowStatus::ToCompile => jobs.push(Job { index, map: None }),
+            RowStatus::ToCompile => {
+                jobs.push(Job { index, map: None, after: order.after[index].clone() });
+            }
             _ => {}
         }
     }
     jobs
+}
+
+/// What a mission reads of others' making: as it did; where it is to be compiled, as it says.
+fn reads(mission: &Found, plan: &Plan, start: &Path) -> Vec<PathBuf> {
+    if let Plan::Keep(_, reads) = plan {
+        return reads.clone();
+    }
+    let name = mission.path.display().to_string();
+    let parsed = std::fs::read_to_string(&mission.path).ok().and_then(|text| mission::parse(&name, &text).ok());
+    let file = parsed.and_then(|parsed| parsed.start_file);
+    file.iter().map(|file| output::spelled(&tidy(&folder_of(&mission.path).join(file)), start)).collect()
+}
+
+/// The folder of each mission's output, as build systems spell it.
+fn out_folders(missions: &[Found], out: &Path, start: &Path) -> Vec<PathBuf> {
+    missions.iter().map(|mission| output::spelled(&tidy(&out.join(&mission.name)), start)).collect()
 }
 
 /// The key of the map that a mission may share with others.

@@ -133,6 +133,7 @@ fn of_map(args: &InspectArgs, path: &Path) -> Result<Understood, Diagnostics> {
         origin: None,
         keep_out: Vec::new(),
         boxes: Vec::new(),
+        speed_zones: Vec::new(),
     };
     let beside = file.beside.as_ref().map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
     let inputs = MapInputs { name: &file.name, bytes: &file.bytes, beside };
@@ -157,7 +158,9 @@ fn of_mission(path: &Path) -> Result<Understood, Diagnostics> {
     let pose = |p: &crate::mission::PoseSpec| {
         let number = |v: Option<f64>| v.map_or("free".to_owned(), |v| format!("{v}"));
         let joints: Vec<String> = p.joints.iter().map(|(name, v)| format!("{name} {v}")).collect();
-        format!("x {} m, y {} m, yaw {} rad {}", number(p.x), number(p.y), number(p.yaw), joints.join(", "))
+        let within = if p.within > 0.0 { format!(" (anywhere within {} m)", p.within) } else { String::new() };
+        let [x, y, yaw] = [p.x, p.y, p.yaw].map(number);
+        format!("x {x} m, y {y} m{within}, yaw {yaw} rad {}", joints.join(", "))
     };
     let vias = mission.via.iter().map(|via| ("via", Some(&via.place)));
     let ends = [("start", mission.start.as_ref())].into_iter().chain(vias).chain([("goal", mission.goal.as_ref())]);
@@ -165,6 +168,9 @@ fn of_mission(path: &Path) -> Result<Understood, Diagnostics> {
         if let Some(spec) = spec {
             out += &format!("  {name:<10} {}\n", pose(spec));
         }
+    }
+    if let Some(file) = &mission.start_file {
+        out += &format!("             start from {}\n", file.display());
     }
     out += &format!("  clearance  {} m, sampling time {} s\n", mission.clearance, mission.sampling_time);
     out += "  reads     ";

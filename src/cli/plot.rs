@@ -86,6 +86,7 @@ pub(super) fn mission(mission: &Mission, world: &World) -> Figure {
             TopView::around(path.iter().copied().chain(given), AROUND)
         }
     };
+    place::zones(&mut view, mission.speed_zones());
     if !path.is_empty() {
         view.path(path, "given path");
     }

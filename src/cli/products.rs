@@ -143,6 +143,7 @@ impl Products<'_> {
             map: world.and_then(|w| w.map.as_deref()),
             commands: outcome.compiled.as_ref().map(|c| &c.commands).or(outcome.traces.refused.as_ref()),
             ends: [mission.start.as_ref(), mission.goal.as_ref()],
+            zones: mission.speed_zones(),
             route: &outcome.traces.route,
             trust: outcome.traces.trust.as_ref(),
         };
@@ -176,6 +177,7 @@ impl Products<'_> {
                 robot_yaml: inputs.robot_yaml.as_ref().map(|f| f.text.as_str()),
                 urdf: &inputs.urdf.text,
                 report,
+                start_file: inputs.start_file.as_ref().map(|f| (file_name(&f.name), f.bytes.as_slice())),
                 path_csv: inputs.path_csv.as_ref().map(|f| f.text.as_str()),
                 meshes: &self.meshes(&start),
             })?;
@@ -206,6 +208,11 @@ pub const DEPFILE: &str = "commands.d";
 /// that were read, as spelled from the folder in which the program was started.
 pub fn dependencies(folder: &Path, target: &str, read: &[PathBuf], start: &Path) -> String {
     depfile(&spelled(&folder.join(target), start), read)
+}
+
+/// The part behind the last folder.
+fn file_name(path: &str) -> &str {
+    Path::new(path).file_name().and_then(|name| name.to_str()).unwrap_or(path)
 }
 
 /// The path that leads from a folder to a file, both absolute; with `..` where needed.

@@ -196,3 +196,5 @@ fn uncorrected(profile: &MotionProfile, robot: &RobotModel, options: &SampleOpti
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod zone_tests;

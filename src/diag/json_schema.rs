@@ -50,6 +50,9 @@ fn of(shape: &'static Shape) -> Map<String, Value> {
         Shape::Number(bounds) => number(bounds),
         Shape::Angle(bounds) => json!({"anyOf": [number(bounds), {"type": "string", "pattern": DEGREES}]}),
         Shape::Share(bounds) => json!({"anyOf": [number(bounds), {"type": "string", "pattern": PERCENT}]}),
+        Shape::AngleOr(bounds, word) => {
+            json!({"anyOf": [number(bounds), {"type": "string", "pattern": DEGREES}, {"const": word}]})
+        }
         Shape::Choice(choices) => {
             let words: Vec<&str> = choices.iter().filter(|c| c.later.is_none()).map(|c| c.word).collect();
             json!({"enum": words})

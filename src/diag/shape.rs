@@ -48,6 +48,8 @@ pub enum Shape {
     Angle(Bounds),
     /// A finite number within bounds, or the same in percent: `0.2%`.
     Share(Bounds),
+    /// The same, or a word that says that any will do.
+    AngleOr(Bounds, &'static str),
     /// One of these words.
     Choice(&'static [Choice]),
     /// A list.
@@ -221,7 +223,8 @@ impl Checker<'_> {
                 Value::Number(number) => self.number(node, number, bounds, field, path),
                 _ => self.wrong(node, field, shape, path),
             },
-            Shape::Angle(bounds) => match &node.value {
+            Shape::AngleOr(_, word) if node.text() == Some(word) => {}
+            Shape::Angle(bounds) | Shape::AngleOr(bounds, _) => match &node.value {
                 Value::Number(number) => self.number(node, *number, bounds, field, path),
                 Value::Text(text) if degrees(text).is_some() => {
                     let angle = degrees(text).map_or(f64::NAN, f64::to_radians);

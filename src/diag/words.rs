@@ -13,6 +13,7 @@ pub(super) fn words(shape: &Shape) -> String {
         Shape::Number(bounds) => format!("a number{}", unit(bounds)),
         Shape::Angle(bounds) => format!("a number{} or degrees such as `90deg`", unit(bounds)),
         Shape::Share(_) => "a share: a number, or percent such as `0.2%`".into(),
+        Shape::AngleOr(bounds, word) => format!("a number{}, degrees such as `90deg`, or `{word}`", unit(bounds)),
         Shape::Choice(choices) => {
             one_of(&choices.iter().filter(|c| c.later.is_none()).map(|c| c.word).collect::<Vec<_>>())
         }
@@ -94,7 +95,7 @@ pub(super) fn how_many(n: usize) -> String {
 pub(super) fn spelling(text: &str, shape: &Shape) -> Option<String> {
     let text = text.trim();
     let angle = match shape {
-        Shape::Angle(_) => true,
+        Shape::Angle(_) | Shape::AngleOr(..) => true,
         Shape::Number(_) | Shape::Share(_) => false,
         Shape::Flag => {
             let meant = match text.to_ascii_lowercase().as_str() {

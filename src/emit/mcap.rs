@@ -51,6 +51,8 @@ pub mod attached {
     pub const REPORT: &str = "report.json";
     /// The file of a given path; not there where the mission names none.
     pub const PATH: &str = "path.csv";
+    /// Prefix of the command file where whose motion ends this one starts; the rest is its name. Not there where the mission names none.
+    pub const START: &str = "start/";
     /// Prefix of meshes; the rest is the path to the file from the URDF's folder.
     pub const MESHES: &str = "meshes/";
 }
@@ -74,6 +76,8 @@ pub struct McapInputs<'a> {
     pub report: &'a str,
     /// Text of the given path's file, where the mission names one.
     pub path_csv: Option<&'a str>,
+    /// `start: {file}` of the mission: name without folders, and bytes.
+    pub start_file: Option<(&'a str, &'a [u8])>,
     /// Meshes: path from the URDF's folder, and bytes. Paths differ.
     pub meshes: &'a [(String, Vec<u8>)],
 }
@@ -156,6 +160,11 @@ impl File {
         files.push((attached::URDF.to_string(), "application/xml", inputs.urdf.as_bytes()));
         files.push((attached::REPORT.to_string(), "application/json", inputs.report.as_bytes()));
         files.extend(inputs.path_csv.map(|text| (attached::PATH.to_string(), "text/csv", text.as_bytes())));
+        if let Some((name, bytes)) = inputs.start_file {
+            let kind =
+                if name.to_ascii_lowercase().ends_with(".mcap") { "application/octet-stream" } else { "text/csv" };
+            files.push((format!("{}{name}", attached::START), kind, bytes));
+        }
         for (name, bytes) in inputs.meshes {
             let kind = if name.to_ascii_lowercase().ends_with(".obj") { "model/obj" } else { "model/stl" };
             files.push((format!("{}{name}", attached::MESHES), kind, bytes));

@@ -58,6 +58,7 @@ impl SceneSet {
             robot: Default::default(),
             map: None,
             start: Some(scene.start.clone()),
+            start_file: None,
             goal: Some(scene.goal.clone()),
             via: Vec::new(),
             path: None,

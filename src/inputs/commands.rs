@@ -197,6 +197,11 @@ impl CommandFile {
         if let Some(mission::PathSpec::File(file)) = &mission.path {
             files.insert(tidy(&folder.join(file)), text(attached::PATH)?);
         }
+        if let Some(file) = &mission.start_file
+            && let Some(own) = self.attachments.iter().find(|a| a.name.starts_with(attached::START))
+        {
+            files.insert(tidy(&folder.join(file)), own.bytes.clone());
+        }
         let meshes = self.attachments.iter().filter_map(|a| Some((a.name.strip_prefix(attached::MESHES)?, &a.bytes)));
         for (name, bytes) in meshes {
             files.insert(tidy(&folder_of(&urdf).join(name)), bytes.clone());

@@ -122,6 +122,19 @@ impl Disk {
         self.on_disk(path).map_err(|error| unreadable(path, &error, named_by).into())
     }
 
+    /// Reads bytes that may be attached.
+    ///
+    /// # Errors
+    /// The file is missing or unreadable.
+    pub fn file(&self, path: &Path, named_by: Option<&Span>) -> Result<Vec<u8>, Diagnostics> {
+        self.bytes(path).map_err(|error| unreadable(path, &error, named_by).into())
+    }
+
+    /// Whether files come from the disk, not from attachments.
+    pub(super) fn is_real(&self) -> bool {
+        self.attached.is_none()
+    }
+
     /// Reads a text.
     ///
     /// # Errors

@@ -5,6 +5,7 @@
 pub mod commands;
 mod disk;
 pub mod machine;
+mod start;
 
 use std::path::{Path, PathBuf};
 use std::sync::{PoisonError, RwLock};
@@ -55,10 +56,15 @@ pub fn read_with(mission_path: &Path, disk: &Disk, choose_map: ChooseMap<'_>) ->
         }
         _ => None,
     };
+    let start_file = mission.start_file.as_ref().and_then(|file| {
+        let read = start::read(&tidy(&folder.join(file)), &robot_path, &mission, disk);
+        read.map_err(|d| faults.extend(d.0)).ok()
+    });
     match robot {
         Some((spec, yaml, urdf)) if faults.is_empty() => {
             let files = Box::new(disk.clone());
-            Ok(Inputs { mission, mission_text: text, robot_spec: spec, robot_yaml: yaml, urdf, map, path_csv, files })
+            let (mission_text, robot_spec, robot_yaml) = (text, spec, yaml);
+            Ok(Inputs { mission, mission_text, robot_spec, robot_yaml, urdf, map, path_csv, start_file, files })
         }
         _ => Err(Diagnostics(faults)),
     }

@@ -23,13 +23,13 @@ pub(super) static MISSION: [Field; 15] = [
     ),
     Field::optional(
         "start",
-        Shape::Table(&POSE),
+        Shape::Table(&START),
         "{x_m: 0.5, y_m: 0.5, yaw: 0deg}",
         "where the robot stands; a joint left out is the compiler's choice",
     ),
     Field::optional(
         "goal",
-        Shape::Table(&POSE),
+        Shape::Table(&GOAL),
         "{x_m: 9.0, y_m: 8.0, yaw: 90deg}",
         "where it must come to rest; yaw or joints left out are the compiler's choice",
     ),
@@ -98,7 +98,7 @@ pub(super) static MISSION: [Field; 15] = [
     Field::optional("path", Shape::Table(&PATH), "{file: path.csv}", "a given path instead of `map` and `goal`"),
 ];
 
-static MAP: [Field; 7] = [
+static MAP: [Field; 8] = [
     Field::required(
         "file",
         Shape::Text,
@@ -145,9 +145,46 @@ static MAP: [Field; 7] = [
         "[{min_m: [2, 1, 0], max_m: [3, 2, 0.5]}]",
         "boxes that count as obstacles beside those of the file; `height_m` does not cut them",
     ),
+    Field::optional(
+        "speed_zones",
+        Shape::List {
+            item: &super::zones::ZONE,
+            count: (0, 1000),
+            form: "a list of areas `{polygon_m: ..., speed_mps: ...}`",
+        },
+        "[{polygon_m: [[2, 1], [3, 1], [3, 2]], speed_mps: 0.3}]",
+        "areas in which the base drives no faster than their speed",
+    ),
 ];
 
-pub(super) static POSE: [Field; 4] = [
+/// How far from a place will do: less than this is what every end may miss its place by.
+const WITHIN: Shape = Shape::Number(Bounds::between(0.001, 1000.0, "m"));
+const ANY_YAW: Shape = Shape::AngleOr(Bounds::any("rad"), "any");
+
+pub(super) static GOAL: [Field; 5] = [
+    Field::optional("x_m", METRES, "9.0", "metres, map frame"),
+    Field::optional("y_m", METRES, "8.0", "metres, map frame"),
+    Field::optional(
+        "within_m",
+        WITHIN,
+        "0.3",
+        "anywhere so near to that point will do, metres; left out: at the point, but for 1 mm",
+    ),
+    Field::optional(
+        "yaw",
+        ANY_YAW,
+        "90deg",
+        "heading, radians or degrees, counter-clockwise from x; `any` or left out: any heading",
+    ),
+    Field::optional(
+        "joints",
+        Shape::Named(&Shape::Angle(Bounds::any("rad or m"))),
+        "{blade: 90deg}",
+        "joint positions by name: radians, metres or degrees; left out: any",
+    ),
+];
+
+pub(super) static START: [Field; 5] = [
     Field::optional("x_m", METRES, "0.5", "metres, map frame"),
     Field::optional("y_m", METRES, "0.5", "metres, map frame"),
     Field::optional(
@@ -162,17 +199,29 @@ pub(super) static POSE: [Field; 4] = [
         "{blade: 90deg}",
         "joint positions by name: radians, metres or degrees",
     ),
+    Field::optional(
+        "file",
+        Shape::Text,
+        "../out/first/commands.csv",
+        "begin where the motion of this commands.csv or .mcap ends, instead of a pose and joints; relative to the mission",
+    ),
 ];
 
 static VIA: Shape = Shape::Table(&STOP);
-static STOP: [Field; 5] = [
+static STOP: [Field; 6] = [
     Field::required("x_m", METRES, "4.0", "metres, map frame"),
     Field::required("y_m", METRES, "4.0", "metres, map frame"),
     Field::optional(
+        "within_m",
+        WITHIN,
+        "0.3",
+        "anywhere so near to that point will do, metres; left out: at the point, but for 1 mm",
+    ),
+    Field::optional(
         "yaw",
-        Shape::Angle(Bounds::any("rad")),
+        ANY_YAW,
         "90deg",
-        "heading, radians or degrees, counter-clockwise from x; left out: as it comes",
+        "heading, radians or degrees, counter-clockwise from x; `any` or left out: as it comes",
     ),
     Field::optional(
         "joints",

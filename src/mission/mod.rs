@@ -5,6 +5,7 @@ pub(crate) mod limits;
 mod read;
 mod solids;
 pub(crate) mod tolerance;
+mod zones;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -14,6 +15,7 @@ use crate::diag::{Diagnostics, Source, Span, json_schema};
 use crate::geom::Aabb;
 pub use solids::KeepOut;
 pub use tolerance::Tolerance;
+pub use zones::SpeedZone;
 
 /// A mission, as written plus defaults. File names are as written, relative to the mission's folder.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,6 +28,8 @@ pub struct Mission {
     pub map: Option<MapSpec>,
     /// Start; with a given path, what of it the mission overrides.
     pub start: Option<PoseSpec>,
+    /// A command file where whose motion ends this one starts, as written. What is in it becomes the start once it is read.
+    pub start_file: Option<PathBuf>,
     /// Goal; likewise.
     pub goal: Option<PoseSpec>,
     /// Where to stop on the way, in order.
@@ -73,6 +77,8 @@ pub struct MissionSpans {
     pub map_height: Option<Span>,
     /// `start` with its value.
     pub start: Option<Span>,
+    /// The value of `start.file`.
+    pub start_file: Option<Span>,
     /// `goal` with its value.
     pub goal: Option<Span>,
     /// Each item of `via`.
@@ -115,6 +121,15 @@ pub struct MapSpec {
     pub keep_out: Vec<KeepOut>,
     /// Boxes that count as obstacles, m.
     pub boxes: Vec<Aabb>,
+    /// Areas in which the base is slower.
+    pub speed_zones: Vec<SpeedZone>,
+}
+
+impl Mission {
+    /// Where the base must be slow.
+    pub fn speed_zones(&self) -> &[SpeedZone] {
+        self.map.as_ref().map_or(&[], |map| &map.speed_zones)
+    }
 }
 
 impl MapSpec {
@@ -140,6 +155,8 @@ pub struct PoseSpec {
     pub x: Option<f64>,
     /// Metres.
     pub y: Option<f64>,
+    /// How far from there will do, metres; 0: there, but for what a certificate allows every end. Of goals and vias.
+    pub within: f64,
     /// Radians.
     pub yaw: Option<f64>,
     /// Joint values by name: radians or metres.

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::fields::{MISSION, PARAMETERISATIONS, PATH, POSE, SAMPLING_LAWS, TIME_LAWS};
+use super::fields::{GOAL, MISSION, PARAMETERISATIONS, PATH, SAMPLING_LAWS, START, TIME_LAWS};
 use super::{
     MapSpec, Mission, MissionSpans, NamedJoint, Parameterisation, PathSpec, PoseSpec, Sampling, TimeLaw, Unknown,
-    ViaSpec, limits, solids, tolerance,
+    ViaSpec, limits, solids, tolerance, zones,
 };
 use crate::diag::shape::Field;
 use crate::diag::yaml::{Entry, Node};
@@ -39,6 +39,7 @@ pub(super) fn parse(name: &str, text: &str) -> Result<Mission, Diagnostics> {
         robot: path(root.get("robot")).unwrap_or_default(),
         map: root.get("map").map(map),
         start: root.get("start").map(pose),
+        start_file: path(root.get("start").and_then(|start| start.get("file"))),
         goal: root.get("goal").map(pose),
         via: root.get("via").map_or(&[][..], Node::items).iter().map(via).collect(),
         path: root.get("path").and_then(given_path),
@@ -84,6 +85,7 @@ fn map(node: &Node) -> MapSpec {
         origin: node.get("origin_m").and_then(numbers),
         keep_out: solids::keep_outs(node),
         boxes: solids::boxes(node),
+        speed_zones: zones::zones(node),
     }
 }
 
@@ -92,6 +94,7 @@ fn pose(node: &Node) -> PoseSpec {
     PoseSpec {
         x: node.get("x_m").and_then(Node::number),
         y: node.get("y_m").and_then(Node::number),
+        within: node.get("within_m").and_then(Node::number).unwrap_or(0.0),
         yaw: node.get("yaw").and_then(Node::angle),
         joints: joints.iter().filter_map(|e| Some((e.key.clone(), e.value.angle()?))).collect(),
     }
@@ -145,6 +148,7 @@ fn spans(source: &Arc<Source>, root: &Node) -> MissionSpans {
         map_resolution: value("map", "resolution_m"),
         map_height: value("map", "height_m"),
         start: whole("start"),
+        start_file: value("start", "file"),
         goal: whole("goal"),
         via: vias.iter().map(|via| Span::new(source, via.range.clone())).collect(),
         path: whole("path"),
@@ -177,8 +181,10 @@ impl Between<'_> {
         } else {
             self.search(&mut faults);
         }
+        self.start_file(&mut faults);
         if let Some(map) = self.root.get("map") {
             faults.extend(solids::check(self.source, map));
+            faults.extend(zones::check(self.source, map));
         }
         if let Some(height) = self.root.get("map").and_then(|m| m.get("height_m"))
             && let Some([low, high]) = numbers(height)
@@ -218,12 +224,17 @@ impl Between<'_> {
             let hint = format!("add `{key}: {example}`");
             faults.push(Diagnostic::error("mission/missing-key", message).at(&top).hint(hint));
         }
-        for (key, parts) in [("start", &["x_m", "y_m", "yaw"][..]), ("goal", &["x_m", "y_m"])] {
+        for (key, table, parts) in
+            [("start", &START[..], &["x_m", "y_m", "yaw"][..]), ("goal", &GOAL[..], &["x_m", "y_m"])]
+        {
             let Some(pose) = self.root.entry(key) else { continue };
+            if key == "start" && self.has(&pose.value, table, "file") {
+                continue;
+            }
             // Not a map at all: already said.
             let empty = matches!(&pose.value.value, yaml::Value::Map(_));
             let missing: Vec<String> =
-                parts.iter().filter(|p| empty && !self.has(&pose.value, &POSE, p)).map(|p| format!("`{p}`")).collect();
+                parts.iter().filter(|p| empty && !self.has(&pose.value, table, p)).map(|p| format!("`{p}`")).collect();
             if !missing.is_empty() {
                 let are = if missing.len() == 1 { "is" } else { "are" };
                 let message = format!("`{key}` needs {}, which {are} missing", one_and_one(&missing));
@@ -234,6 +245,26 @@ impl Between<'_> {
                 let at = Span::new(self.source, pose.key_range.clone());
                 faults.push(Diagnostic::error("mission/missing-key", message).at(&at).hint(hint));
             }
+        }
+    }
+
+    /// A file says where it ends, with all joints: nothing else may.
+    fn start_file(&self, faults: &mut Vec<Diagnostic>) {
+        let Some(start) = self.root.get("start") else { return };
+        let Some(file) = start.entry("file") else { return };
+        if self.has(self.root, &MISSION, "path") {
+            let at = Span::new(self.source, file.key_range.clone());
+            let message = "`start.file` and a given `path` exclude each other: a given path begins where it does";
+            let hint = "remove `start`, or plan the way with `map` and `goal`";
+            faults.push(Diagnostic::error("mission/start-and-path", message).at(&at).hint(hint));
+        }
+        for key in ["x_m", "y_m", "yaw", "joints"] {
+            let Some(entry) = start.entry(key) else { continue };
+            let at = Span::new(self.source, entry.key_range.clone());
+            let message =
+                format!("`start.{key}` and `start.file` exclude each other: the file's last row says where all is");
+            let hint = format!("remove `{key}`, or `file`");
+            faults.push(Diagnostic::error("mission/two-starts", message).at(&at).hint(hint));
         }
     }
 

@@ -113,7 +113,7 @@ pub(super) fn check(source: &Arc<Source>, map: &Node) -> Vec<Diagnostic> {
 }
 
 /// Whether a polygon is at least 1 mm wide across each of its sides.
-fn has_an_area(polygon: &[[f64; 2]]) -> bool {
+pub(super) fn has_an_area(polygon: &[[f64; 2]]) -> bool {
     let next = polygon.iter().cycle().skip(1);
     let widths = polygon.iter().zip(next).filter_map(|(a, b)| {
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);

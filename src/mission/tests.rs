@@ -17,8 +17,9 @@ map:
   origin_m: [1, 2, 3]
   keep_out: [{polygon_m: [[0, 0], [1, 0], [1, 2]], height_m: [0.1, 0.5]}]
   boxes: [{min_m: [0, 1, 2], max_m: [3, 4, 5]}]
+  speed_zones: [{polygon_m: [[0, 0], [2, 0], [2, 3]], speed_mps: 0.25}]
 start: {x_m: 0.5, y_m: -0.5, yaw: 180deg, joints: {blade: 90deg, lift: 0.1}}
-goal: {x_m: 9.0, y_m: 8.0, yaw: 1.5, joints: {blade: 0}}
+goal: {x_m: 9.0, y_m: 8.0, within_m: 0.3, yaw: 1.5, joints: {blade: 0}}
 clearance_m: 0.1
 sampling_time_s: 0.05
 sampling: instant
@@ -35,7 +36,8 @@ path: {bezier: [[[0, 0], [2, 0], [4, 2], [4, 4]], [[4, 4], [4, 5], [4, 6], [4, 7
 ";
 
 /// Not together with a given path, which [`FULL`] has.
-const VIA: &str = "via: [{x_m: 4.0, y_m: 4.5, yaw: 90deg, joints: {blade: 1}, dwell_s: 2}, {x_m: 5.0, y_m: 6.0}]\n";
+const VIA: &str =
+    "via: [{x_m: 4.0, y_m: 4.5, within_m: 0.2, yaw: 90deg, joints: {blade: 1}, dwell_s: 2}, {x_m: 5.0, y_m: 6.0}]\n";
 
 const LEAST: &str = "robot: r.urdf\nmap: {file: m.pcd}\nstart: {x_m: 1, y_m: 2, yaw: 0}\ngoal: {x_m: 3, y_m: 4}\n";
 
@@ -74,13 +76,14 @@ fn every_key_is_read() {
         origin: Some([1.0, 2.0, 3.0]),
         keep_out: vec![KeepOut { polygon: vec![[0.0, 0.0], [1.0, 0.0], [1.0, 2.0]], height: Some([0.1, 0.5]) }],
         boxes: vec![Aabb { min: [0.0, 1.0, 2.0], max: [3.0, 4.0, 5.0] }],
+        speed_zones: vec![SpeedZone { polygon: vec![[0.0, 0.0], [2.0, 0.0], [2.0, 3.0]], speed: 0.25 }],
     };
     assert_eq!(mission.map, Some(map));
     let start = mission.start.expect("start");
     assert_eq!((start.x, start.y, start.yaw), (Some(0.5), Some(-0.5), Some(PI)));
     assert_eq!(start.joints, BTreeMap::from([("blade".into(), FRAC_PI_2), ("lift".into(), 0.1)]));
     let goal = mission.goal.expect("goal");
-    assert_eq!((goal.yaw, goal.joints["blade"]), (Some(1.5), 0.0));
+    assert_eq!((goal.within, goal.yaw, goal.joints["blade"]), (0.3, Some(1.5), 0.0));
     assert_eq!((mission.clearance, mission.sampling_time), (0.1, 0.05));
     assert_eq!((mission.sampling, mission.time_law, mission.reverse), (Sampling::Instant, TimeLaw::Eq5, true));
     assert_eq!(mission.parameterisation, Parameterisation::ArcLength);
@@ -102,7 +105,7 @@ fn stops_on_the_way_are_read_in_their_order() {
     let mission = good(&format!("{LEAST}{VIA}"));
     let [first, second] = &mission.via[..] else { panic!("{:?}", mission.via) };
     assert_eq!((first.place.x, first.place.y, first.place.yaw), (Some(4.0), Some(4.5), Some(FRAC_PI_2)));
-    assert_eq!((first.place.joints["blade"], first.dwell), (1.0, 2.0));
+    assert_eq!((first.place.within, first.place.joints["blade"], first.dwell), (0.2, 1.0, 2.0));
     assert_eq!((second.place.x, second.place.yaw, second.dwell), (Some(5.0), None, 0.0));
     assert_eq!((mission.spans.via.len(), mission.spans.joints[0].under.as_str()), (2, "via[0]"));
     assert_eq!(codes("robot: r\nvia: [{x_m: 1, y_m: 1}]\npath: {file: a.csv}\n"), ["mission/via-and-path"]);
@@ -145,6 +148,27 @@ fn a_later_stage_can_point_at_what_it_refuses() {
     let joints: Vec<(&str, &str)> = mission.spans.joints.iter().map(|j| (j.name.as_str(), j.under.as_str())).collect();
     assert_eq!(joints, [("blade", "start"), ("lift", "start"), ("blade", "goal"), ("blade", "limits.joints")]);
     assert!(mission.spans.joints.iter().all(|j| text(&Some(j.at.clone())) == j.name));
+}
+
+#[test]
+fn a_start_is_a_pose_or_a_file_that_ends_there() {
+    let text = LEAST.replace("{x_m: 1, y_m: 2, yaw: 0}", "{file: ../out/b/commands.mcap}");
+    let mission = good(&text);
+    assert_eq!(mission.start_file, Some("../out/b/commands.mcap".into()));
+    let span = mission.spans.start_file.expect("written");
+    assert_eq!(&text[span.range], "../out/b/commands.mcap");
+    for more in ["x_m: 1", "yaw: 90deg", "joints: {blade: 1}"] {
+        assert_eq!(codes(&text.replace(".mcap}", &format!(".mcap, {more}}}"))), ["mission/two-starts"]);
+    }
+    assert_eq!(codes("robot: r\nstart: {file: a.csv}\npath: {file: b.csv}\n"), ["mission/start-and-path"]);
+}
+
+#[test]
+fn a_heading_that_is_any_is_one_that_is_left_out() {
+    let mission =
+        good(&format!("{}via: [{{x_m: 1, y_m: 1, yaw: any}}]\n", LEAST.replace("y_m: 4}", "y_m: 4, yaw: any}")));
+    assert_eq!((mission.goal.expect("goal").yaw, mission.via[0].place.yaw), (None, None));
+    assert_eq!(codes(&LEAST.replace("yaw: 0}", "yaw: any}")), ["yaml/wrong-type"]);
 }
 
 #[test]
@@ -240,8 +264,12 @@ fn the_mission_with_every_key_has_every_key() {
         });
         let node = node.unwrap_or_else(|| panic!("{path:?}"));
         for field in table.iter().filter(|f| !matches!(f.shape, Shape::Later(_))) {
-            // Two ways to give a path; this mission has the other one.
-            assert!(field.key == "file" && path == ["path"] || node.get(field.key).is_some(), "{path:?} {}", field.key);
+            // Two ways to give a path or a start; this mission has the other one.
+            assert!(
+                field.key == "file" && (path == ["path"] || path == ["start"]) || node.get(field.key).is_some(),
+                "{path:?} {}",
+                field.key
+            );
         }
     }
 }

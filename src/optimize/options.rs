@@ -3,7 +3,7 @@
 use super::objective::Weights;
 use super::steer::SteerOptions;
 use crate::math::lbfgs::LbfgsOptions;
-use crate::mission::Parameterisation;
+use crate::mission::{Parameterisation, SpeedZone};
 
 /// How to optimise.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,6 +56,8 @@ pub struct OptimizeOptions {
     pub spin_threshold: f64,
     /// The same at start and goal, where the position is fixed. Default 45 degrees.
     pub end_spin_threshold: f64,
+    /// Where the base is to be slow; of heading and arc length alone. Default: nowhere.
+    pub zones: Vec<SpeedZone>,
     /// The iteration.
     pub lbfgs: LbfgsOptions,
 }
@@ -95,6 +97,7 @@ impl Default for OptimizeOptions {
             slowest_corner: 0.2,
             spin_threshold: 100f64.to_radians(),
             end_spin_threshold: 45f64.to_radians(),
+            zones: Vec::new(),
             lbfgs: LbfgsOptions { memory: 20, decrease_tolerance: 5e-4, past: 8, ..LbfgsOptions::default() },
         }
     }

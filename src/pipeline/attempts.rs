@@ -1,7 +1,7 @@
 //! Optimising one path, try after try, until a motion is certified.
 
 use super::{CompileOptions, Finish, Made, Place, Run};
-use crate::certify::{self, Task};
+use crate::certify::{self, Demands, Task};
 use crate::command::CommandTable;
 use crate::diag::Diagnostics;
 use crate::geom::Pose2;
@@ -151,11 +151,14 @@ impl Attempts<'_> {
 
     fn certify(&self, run: &mut Run<'_>, trajectory: Trajectory) -> Result<Made, Diagnostics> {
         let task = (self.task)(&trajectory);
-        let Finish { robot, map, .. } = self.finish;
+        let Finish { mission, robot, map, .. } = self.finish;
         let mut made = self.finish.certify_task(run, trajectory, &task)?;
         if let Some(since) = self.since.filter(|_| robot.tolerance.is_some()) {
             let (whole, task) = since.with(&made.commands, &task);
-            made.certificate = run.stage("certify", || certify::certify(&whole, robot, *map, &task));
+            made.certificate = run.stage("certify", || {
+                let demands = Demands { vias: &[], zones: mission.speed_zones() };
+                certify::certify_through(&whole, robot, *map, &task, demands)
+            });
         }
         Ok(made)
     }
@@ -201,6 +204,7 @@ impl Attempts<'_> {
             let usual = if compile.spins { OptimizeOptions::default() } else { OptimizeOptions::without_spins() };
             let clearance = mission.clearance + margin;
             let mut options = OptimizeOptions { parameterisation, clearance, dense: compile.dense, ..usual };
+            options.zones = mission.speed_zones().to_vec();
             if look != Look::First {
                 options.steer = options.steer.closer();
                 options.clearance += MISSED_TIMES * missed;

@@ -1,7 +1,7 @@
 //! Command files that are there already: judged, measured.
 
 use super::{Inputs, World, end_of, given_path, goal, start_of, vias};
-use crate::certify::{self, Certificate, Task};
+use crate::certify::{self, Certificate, Demands, Task};
 use crate::command::CommandTable;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::geom::Pose2;
@@ -46,7 +46,8 @@ pub fn check(inputs: &Inputs, world: &World, table: &CommandTable) -> Result<Cer
         start_joints.map(|(j, own)| asked.and_then(|p| p.joints.get(&j.name).copied()).unwrap_or(*own)).collect();
     let goal = goal(mission, robot, given.as_ref().map(end_of));
     let task = Task { start, start_joints, goal, clearance: mission.clearance, reverse: mission.reverse };
-    Ok(certify::certify_through(table, robot, map.as_deref(), &task, &vias(mission, robot)))
+    let demands = Demands { vias: &vias(mission, robot), zones: mission.speed_zones() };
+    Ok(certify::certify_through(table, robot, map.as_deref(), &task, demands))
 }
 
 /// The path error of commands as they are written: their replay against the mission's given path, or, where the path was

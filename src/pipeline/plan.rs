@@ -142,6 +142,7 @@ fn query(mission: &Mission, robot: &RobotModel) -> Query {
         start: pose(&start),
         start_joints: joints(&start),
         goal: pose(&goal),
+        goal_within: goal.within,
         goal_yaw: goal.yaw,
         goal_joints: joints(&goal),
     }

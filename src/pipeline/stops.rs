@@ -3,7 +3,7 @@
 use super::attempts::{Attempts, Since};
 use super::plan::{motion, note, route};
 use super::{CompileOptions, Finish, Made, Place, Run, place_of, refused, start_of, vias};
-use crate::certify::{self, Task};
+use crate::certify::{self, Demands, Task};
 use crate::command::{CommandError, CommandTable, MOST_ROWS};
 use crate::diag::{Describe, Diagnostics};
 use crate::geom::Pose2;
@@ -42,6 +42,7 @@ pub(super) fn plan(
             start: from.pose,
             start_joints: from.joints.clone(),
             goal: pose(place, 0.0),
+            goal_within: place.within,
             goal_yaw: place.yaw,
             goal_joints: joints(place, robot),
         };
@@ -77,10 +78,11 @@ pub(super) fn plan(
     let trajectory = joined_trajectories(&stretches);
     // For its figures and the path error; the commands are those of the stretches, so that rests begin and end with a row.
     let options = RetimeOptions { law: finish.law(&trajectory), sampling_time: finish.sampling_time };
-    let profile = run.stage("retime", || retime::retime(&trajectory, robot, &options))?;
+    let profile = run.stage("retime", || retime::retime_in(&trajectory, robot, &options, mission.speed_zones()))?;
     let task = finish.task(&trajectory);
     let stops = vias(mission, robot);
-    let certificate = run.stage("certify", || certify::certify_through(&commands, robot, finish.map, &task, &stops));
+    let demands = Demands { vias: &stops, zones: mission.speed_zones() };
+    let certificate = run.stage("certify", || certify::certify_through(&commands, robot, finish.map, &task, demands));
     Ok(Made { trajectory, profile, commands, certificate })
 }
 

@@ -1,24 +1,31 @@
 //! What a mission's text and files mean, before anything is planned.
 
-use super::{Inputs, World};
+use super::{Inputs, StartFile, World};
 use crate::diag::{Diagnostic, Diagnostics, Span, nearest};
+use crate::geom::wrap_angle;
 use crate::map::{self, MapInputs};
-use crate::mission::{Mission, ToleranceSpec};
-use crate::robot::{self, RobotInputs, RobotModel};
+use crate::mission::{Mission, PoseSpec, ToleranceSpec};
+use crate::robot::{self, MovingJoint, RobotInputs, RobotModel};
+
+/// Wheels are the same up to this, m.
+const SAME_WHEELS: f64 = 1e-9;
 
 /// The robot and the map, checked against what the mission says of them.
 ///
 /// # Errors
 /// All faults found.
 pub fn world(inputs: &mut Inputs) -> Result<World, Diagnostics> {
-    let mission = &inputs.mission;
     let mut robot = robot::parse(RobotInputs {
         spec: &inputs.robot_spec,
         urdf: (&inputs.urdf.name, &inputs.urdf.text),
         files: inputs.files.as_mut(),
-        overrides: &mission.limits,
+        overrides: &inputs.mission.limits,
     })?;
-    robot.tolerance = ToleranceSpec::resolved(mission.tolerance, inputs.robot_spec.tolerance);
+    robot.tolerance = ToleranceSpec::resolved(inputs.mission.tolerance, inputs.robot_spec.tolerance);
+    if let Some(file) = &inputs.start_file {
+        inputs.mission.start = Some(end_of(file, &robot, &inputs.mission)?);
+    }
+    let mission = &inputs.mission;
     let faults = unknown_joints(mission, &robot);
     if !faults.is_empty() {
         return Err(Diagnostics(faults));
@@ -32,6 +39,44 @@ pub fn world(inputs: &mut Inputs) -> Result<World, Diagnostics> {
         _ => None,
     };
     Ok(World { robot, map })
+}
+
+/// Where the motion of a command file ends: pose and joints, as replayed.
+fn end_of(file: &StartFile, robot: &RobotModel, mission: &Mission) -> Result<PoseSpec, Diagnostics> {
+    let StartFile { name, table, .. } = file;
+    let fault = |code, message: String, hint: &str| {
+        Diagnostics::from(Diagnostic::error(code, message).maybe_at(mission.spans.start_file.as_ref()).hint(hint))
+    };
+    let same = "a motion goes on only with the same robot";
+    let [theirs, own] = [
+        table.joints.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(),
+        robot.joints.iter().map(|joint| joint.name.as_str()).collect(),
+    ];
+    let kinds = table.joints.iter().zip(&robot.joints).all(|((_, prismatic), joint)| *prismatic == joint.prismatic);
+    if theirs != own || !kinds {
+        let message = format!("`{name}` moves the joints [{}], the robot has [{}]", theirs.join(", "), own.join(", "));
+        return Err(fault("mission/start-robot", message, same));
+    }
+    let wheels = [
+        ("wheel radius", table.wheel_radius, robot.wheel_radius),
+        ("track width", table.track_width, robot.track_width),
+    ];
+    if let Some((what, theirs, own)) = wheels.into_iter().find(|(_, theirs, own)| (theirs - own).abs() > SAME_WHEELS) {
+        let message = format!("`{name}` is for a robot with a {what} of {theirs} m, this one has {own} m");
+        return Err(fault("mission/start-robot", message, same));
+    }
+    let (Some(first), Some(last)) = (table.rows.first(), table.rows.last()) else {
+        return Err(fault("mission/start-file", format!("`{name}` has no row"), "name a complete command file"));
+    };
+    if [last.wheel_left, last.wheel_right].iter().chain(&last.joint_velocities).any(|speed| *speed != 0.0) {
+        let message = format!("`{name}` does not end at rest, so nothing can start there");
+        return Err(fault("mission/start-file", message, "its last row must have all speeds zero"));
+    }
+    let end = table.replay(first.pose).last().copied().unwrap_or(first.pose);
+    // Rounding may leave a joint a little outside its range.
+    let value = |(joint, value): (&MovingJoint, &f64)| (joint.name.clone(), value.clamp(joint.lower, joint.upper));
+    let joints = robot.joints.iter().zip(&last.joint_positions).map(value).collect();
+    Ok(PoseSpec { x: Some(end.x), y: Some(end.y), within: 0.0, yaw: Some(wrap_angle(end.yaw)), joints })
 }
 
 /// Joints that the mission names and the robot does not move, or cannot hold at that value.

@@ -4,7 +4,9 @@ use serde_json::{Map, Value, json};
 
 use super::schema::*;
 use super::{Metrics, Report, Status, names};
-use crate::certify::{Certificate, Closest, InTube, LimitCheck, Reached, Refusal, RefusalKind, Trust};
+use crate::certify::{
+    Certificate, Closest, END_POINT_TOLERANCE, InTube, LimitCheck, Reached, Refusal, RefusalKind, Trust, ZoneSpeed,
+};
 use crate::command::CommandTable;
 use crate::diag::{Diagnostics, Severity};
 use crate::map::VoxelMap;
@@ -82,6 +84,7 @@ fn refusal_kind(kind: RefusalKind) -> &'static str {
         RefusalKind::Reverse => "reverse",
         RefusalKind::End => "end",
         RefusalKind::Via => "via",
+        RefusalKind::Zone => "speed_zone",
         RefusalKind::Table => "table",
     }
 }
@@ -229,8 +232,10 @@ impl From<&Certificate> for CertificatePart {
             clearance_required_m: certificate.clearance_required.and_then(finite),
             clearance_proven_m: proven.and_then(finite),
             end_point_error_m: finite(certificate.end_point_error),
+            goal_within_m: Some(certificate.end_point_allowed).filter(|m| *m > END_POINT_TOLERANCE).and_then(finite),
             end_heading_error_rad: certificate.end_heading_error.and_then(finite),
             vias: certificate.vias.iter().filter_map(via).collect(),
+            speed_zones: certificate.zones.iter().filter_map(zone).collect(),
             limits_hold: certificate.limits_hold,
             closest: certificate.closest.as_ref().and_then(closest),
             tolerance: certificate.tolerance.as_ref().map(in_tube),
@@ -297,6 +302,10 @@ fn via(reached: &Reached) -> Option<ViaPart> {
     })
 }
 
+fn zone(zone: &ZoneSpeed) -> Option<ZonePart> {
+    Some(ZonePart { limit_mps: finite(zone.limit)?, peak_mps: zone.peak.and_then(finite) })
+}
+
 fn closest(closest: &Closest) -> Option<ClosestPart> {
     Some(ClosestPart {
         time_s: finite(closest.time)?,
@@ -337,6 +346,8 @@ mod tests {
             tolerance: None,
             own_links: None,
             end_point_error: 4e-5,
+            end_point_allowed: END_POINT_TOLERANCE,
+            zones: Vec::new(),
             end_heading_error: None,
             vias: Vec::new(),
             limits: vec![LimitCheck { actuator: "wheel_left".into(), quantity: "jerk", peak: 0.1, limit: None }],

@@ -267,14 +267,20 @@ pub struct CertificatePart {
     /// A lower bound of the true clearance, m; absent without a map. Where nothing is near, [`FAR`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clearance_proven_m: Option<f64>,
-    /// m; `null`: not a number.
+    /// From the goal's point, m; `null`: not a number.
     pub end_point_error_m: Option<f64>,
+    /// How far from its point a goal with `within_m` allows, m; absent where it allows what every end may miss.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub goal_within_m: Option<f64>,
     /// rad; absent where the goal leaves the heading open.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub end_heading_error_rad: Option<f64>,
     /// The mission's `via`, in order: each with the time at which the robot first stands there.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub vias: Vec<ViaPart>,
+    /// The mission's `map.speed_zones`, in order: each with the greatest speed in it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub speed_zones: Vec<ZonePart>,
     /// Whether no limit is exceeded.
     pub limits_hold: bool,
     /// The closest approach found.
@@ -365,6 +371,16 @@ pub struct ViaPart {
     /// rad; absent where the via leaves the heading open.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub heading_error_rad: Option<f64>,
+}
+
+/// A speed zone.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ZonePart {
+    /// Allowed there, m/s.
+    pub limit_mps: f64,
+    /// Greatest speed of the base at any instant there, m/s; absent: it is proven to keep out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub peak_mps: Option<f64>,
 }
 
 /// What was proven of the robot's links against each other.

@@ -4,7 +4,7 @@ mod limits;
 
 use std::fmt::Write;
 
-use super::schema::{CertificatePart, LimitPart, Report, RobotPart, Status, TolerancePart, TrustPart};
+use super::schema::{CertificatePart, LimitPart, Report, RobotPart, Status, TolerancePart, TrustPart, ZonePart};
 use crate::certify::{END_ANGLE_TOLERANCE, END_POINT_TOLERANCE};
 pub use limits::table as limits_table;
 
@@ -86,6 +86,7 @@ pub fn proof(out: &mut String, certificate: &CertificatePart, peaks: &[LimitPart
     clearance(out, certificate);
     tolerance(out, certificate);
     own_links(out, certificate, robot);
+    zones(out, certificate);
     goal(out, certificate);
     limits(out, peaks, robot);
 }
@@ -248,6 +249,22 @@ fn own_links(out: &mut String, certificate: &CertificatePart, robot: Option<&Rob
     line(out, "own links", &said);
 }
 
+fn zones(out: &mut String, certificate: &CertificatePart) {
+    let said = zones_text(certificate);
+    if !said.is_empty() {
+        line(out, "slow zones", &said.join(", "));
+    }
+}
+
+/// How fast the base is in each speed zone, in words.
+pub fn zones_text(certificate: &CertificatePart) -> Vec<String> {
+    let zone = |zone: &ZonePart| match zone.peak_mps {
+        Some(peak) => format!("{}/{}{TIE}m/s", figure(peak), figure(zone.limit_mps)),
+        None => "not entered".replace(' ', TIE),
+    };
+    certificate.speed_zones.iter().map(zone).collect()
+}
+
 fn goal(out: &mut String, certificate: &CertificatePart) {
     let stops: Vec<String> = certificate.vias.iter().map(|via| format!("{:.1} s", via.time_s)).collect();
     if !stops.is_empty() {
@@ -260,12 +277,17 @@ fn goal(out: &mut String, certificate: &CertificatePart) {
 
 /// How far from the goal the motion ends, in words.
 pub fn goal_text(certificate: &CertificatePart) -> Option<String> {
-    let (mut missed, mut allowed) = (length(certificate.end_point_error_m?), length(END_POINT_TOLERANCE));
+    let (error, region) = (certificate.end_point_error_m?, certificate.goal_within_m);
+    let (mut missed, mut allowed) = (length(error), length(region.unwrap_or(END_POINT_TOLERANCE)));
+    if region.is_some() {
+        missed += " from its middle";
+    }
     if let Some(heading) = certificate.end_heading_error_rad {
         missed += &format!(" and {}", degrees(heading));
         allowed += &format!(" and {}", degrees(END_ANGLE_TOLERANCE));
     }
-    Some(format!("missed by {missed}; allowed: {allowed}"))
+    let missed = if region.is_some() { missed } else { format!("missed by {missed}") };
+    Some(format!("{missed}; allowed: {allowed}"))
 }
 
 fn limits(out: &mut String, peaks: &[LimitPart], robot: Option<&RobotPart>) {

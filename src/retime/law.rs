@@ -9,11 +9,12 @@ use crate::robot::RobotModel;
 use super::RetimeError;
 use super::convolution::Convolution;
 use super::course::{Course, Curved, Proportional};
-use super::limits::{Scope, append_turn, limits};
+use super::limits::{RowLimits, Scope, append_turn, limits};
 use super::peaks::{Peaks, peaks, slow_down};
 use super::steered::time_steered;
 use super::timed_leg::{Clock, TimedLeg};
 use super::warp::Warp;
+use super::zones::Zones;
 
 /// Shortest ramp of `minco` that is tried, s, and the factor to the next one.
 const RAMPS: (f64, f64) = (0.05, 1.5);
@@ -33,6 +34,17 @@ pub struct Task<'a> {
     pub one_segment: bool,
     /// Index of the leg, for messages.
     pub leg: usize,
+    /// Where the base must be slow.
+    pub zones: Zones<'a>,
+}
+
+impl Task<'_> {
+    /// The limits of the rows that [`peaks_of`] finds.
+    pub(super) fn limits(&self, scope: Scope) -> Vec<RowLimits> {
+        let mut rows = limits(self.robot, scope);
+        self.zones.limit(&mut rows);
+        rows
+    }
 }
 
 /// Times one leg under a law.
@@ -41,7 +53,7 @@ pub struct Task<'a> {
 /// The law cannot time this leg.
 pub fn time_leg(course: &Course, law: TimeLaw, task: Task<'_>) -> Result<TimedLeg, RetimeError> {
     let curved = match course {
-        Course::Proportional(p) => return Ok(proportional(p, task.robot)),
+        Course::Proportional(p) => return Ok(in_zones(proportional(p, task.robot), law, task)),
         Course::Steered(steered) => return time_steered(steered, law, task),
         Course::Curved(curved) => curved,
     };
@@ -95,6 +107,22 @@ fn proportional(course: &Proportional, robot: &RobotModel) -> TimedLeg {
         law: None,
         speed_limit: if course.drive != 0.0 { centre_limits(robot)[0] } else { 0.0 },
         compensation: 0.0,
+    }
+}
+
+/// A leg that is at its best where nothing depends on the place, slowed down where it is to be slow; by the laws that are not the least
+/// time as a whole.
+fn in_zones(leg: TimedLeg, law: TimeLaw, task: Task<'_>) -> TimedLeg {
+    if task.zones.is_empty() {
+        return leg;
+    }
+    let slow = slowed(leg.clone(), task, Scope::Everything);
+    if slow.stretch <= leg.stretch || !matches!(law, TimeLaw::Auto | TimeLaw::Optimal) {
+        return slow;
+    }
+    match optimal::paced(leg, task) {
+        Ok(paced) if paced.duration() < slow.duration() => paced,
+        _ => slow,
     }
 }
 
@@ -174,7 +202,7 @@ fn least_duration(curved: &Curved, law: TimeLaw, task: Task<'_>) -> f64 {
 
 /// Slowed down (from its clock's own speed) until every limit in the scope holds.
 pub(super) fn slowed(leg: TimedLeg, task: Task<'_>, scope: Scope) -> TimedLeg {
-    TimedLeg { stretch: slow_down(&peaks_of(&leg, task, scope), &limits(task.robot, scope), task.hold), ..leg }
+    TimedLeg { stretch: slow_down(&peaks_of(&leg, task, scope), &task.limits(scope), task.hold), ..leg }
 }
 
 /// Peaks before the slow-down of the rows that the scope limits.
@@ -185,6 +213,7 @@ pub(super) fn peaks_of(leg: &TimedLeg, task: Task<'_>, scope: Scope) -> Peaks {
         if scope == Scope::Everything {
             append_turn(task.robot, first, out);
         }
+        task.zones.append(leg, t, first, out);
     })
 }
 
@@ -261,7 +290,7 @@ fn largest_curvature(curved: &Curved) -> f64 {
 /// The optimiser's own timing, with the pair of ramps by which the leg ends soonest after its slow-down.
 fn own(curved: &Curved, task: Task<'_>) -> TimedLeg {
     let seconds = curved.curve.duration();
-    let limits = limits(task.robot, Scope::Actuators);
+    let limits = task.limits(Scope::Actuators);
     let leg = |ramps: [f64; 2]| TimedLeg {
         course: Course::Curved(curved.clone()),
         clock: Clock::Own(Warp::new(seconds, ramps)),

@@ -16,9 +16,10 @@ pub mod profile;
 pub mod steered;
 pub mod timed_leg;
 pub mod warp;
+pub mod zones;
 
 use crate::diag::{Describe, Diagnostic};
-use crate::mission::TimeLaw;
+use crate::mission::{SpeedZone, TimeLaw};
 use crate::robot::RobotModel;
 use crate::trajectory::plane_curve::CurveError;
 use crate::trajectory::{Leg, Trajectory, TrajectorySource};
@@ -27,6 +28,7 @@ pub use profile::{MotionProfile, MotionState};
 
 use course::Course;
 use law::{Task, time_leg};
+use zones::Zones;
 
 /// How to time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -175,6 +177,20 @@ pub fn retime(
     robot: &RobotModel,
     options: &RetimeOptions,
 ) -> Result<MotionProfile, RetimeError> {
+    retime_in(trajectory, robot, options, &[])
+}
+
+/// The same where the base must be slow in some places. `auto` and `optimal` slow down where it must be; other laws make the whole leg
+/// slower.
+///
+/// # Errors
+/// As [`retime`].
+pub fn retime_in(
+    trajectory: &Trajectory,
+    robot: &RobotModel,
+    options: &RetimeOptions,
+    zones: &[SpeedZone],
+) -> Result<MotionProfile, RetimeError> {
     let hold = options.sampling_time;
     if !(hold.is_finite() && hold > 0.0) {
         return Err(RetimeError::SamplingTime { sampling_time: hold });
@@ -190,7 +206,11 @@ pub fn retime(
     let own_timing = trajectory.source == TrajectorySource::Optimised;
     let legs = trajectory.legs.iter().enumerate().map(|(leg, what)| {
         let course = course(what, leg, robot)?;
-        time_leg(&course, options.law, Task { robot, hold, own_timing, one_segment, leg })
+        time_leg(
+            &course,
+            options.law,
+            Task { robot, hold, own_timing, one_segment, leg, zones: Zones::new(zones, robot, hold) },
+        )
     });
     let legs = legs.collect::<Result<Vec<_>, _>>()?;
     if legs.is_empty() {

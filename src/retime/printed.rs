@@ -7,6 +7,7 @@ use crate::trajectory::{Trajectory, TrajectorySource};
 use super::course::Course;
 use super::law::{Task, centre_limits, left_by_eq5, time_leg, unslowed};
 use super::timed_leg::Clock;
+use super::zones::Zones;
 use super::{MotionProfile, RetimeError, course, is_one_cubic};
 
 /// Which of the paper's equations make a profile.
@@ -31,7 +32,7 @@ pub fn as_printed(trajectory: &Trajectory, robot: &RobotModel, how: Printed) -> 
     let (law, clock): (_, fn(_) -> _) =
         if how.eq2 { (TimeLaw::Printed, Clock::Printed) } else { (TimeLaw::Eq5, Clock::ArcLength) };
     let legs = trajectory.legs.iter().enumerate().map(|(leg, what)| {
-        let task = Task { robot, hold: 0.0, own_timing: false, one_segment, leg };
+        let task = Task { robot, hold: 0.0, own_timing: false, one_segment, leg, zones: Zones::new(&[], robot, 0.0) };
         let course = course(what, leg, robot)?;
         let Course::Curved(curved) = &course else { return time_leg(&course, law, task) };
         let [v, a, j] = centre_limits(robot);

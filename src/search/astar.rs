@@ -12,7 +12,7 @@ use super::collide::{BaseMotion, Collider};
 use super::heuristic::CostToGo;
 use super::lattice::{HEADINGS, Lattice, LatticeState, heading_angle, nearest_heading};
 use super::route::{Grain, Route};
-use super::{Query, SearchOptions};
+use super::{Query, SearchOptions, region};
 use crate::geom::{Pose2, wrap_angle};
 
 /// How much the estimate weighs: paths are at most this much longer than the lattice's best.
@@ -145,7 +145,7 @@ fn shots<'a>(from: Pose2, query: &'a Query, options: &SearchOptions) -> impl Ite
     let senses: &[bool] = if options.reverse { &[false, true] } else { &[false] };
     senses.iter().copied().map(move |reverse| {
         let mut route = Route::new(from);
-        route.drive_to([query.goal.x, query.goal.y], reverse);
+        route.drive_to(region::nearest(query, [from.x, from.y]), reverse);
         route.end_with(query.goal_yaw);
         (route, reverse)
     })
@@ -427,7 +427,7 @@ impl<const W: usize> AStar<'_, W> {
                     route.end_with(Some(heading));
                 }
                 Step::Goal { reverse } => {
-                    route.drive_to([self.query.goal.x, self.query.goal.y], reverse);
+                    route.drive_to(region::nearest(self.query, place), reverse);
                     route.end_with(self.query.goal_yaw);
                 }
             }

@@ -1,6 +1,6 @@
 //! Why there is no path, for people and for report.json.
 
-use super::Contact;
+use super::{Contact, Query};
 use crate::diag::{Describe, Diagnostic};
 use crate::geom::{Pose2, wrap_angle};
 
@@ -44,6 +44,18 @@ pub enum SearchError {
     Sampled {
         /// Postures in the roadmap.
         postures: usize,
+    },
+    /// The same of a goal that is a region.
+    #[error("{error}; the goal is any place within {within} m of ({x:.3}, {y:.3})")]
+    OfRegion {
+        /// m.
+        x: f64,
+        /// m.
+        y: f64,
+        /// m.
+        within: f64,
+        /// What is wrong.
+        error: Box<SearchError>,
     },
     /// Out of memory that the search allows itself.
     #[error("gave up after {labels} partial paths: neither a way was found nor its absence proven")]
@@ -183,11 +195,21 @@ fn room(contact: &Contact, clearance: f64) -> String {
 }
 
 impl SearchError {
+    /// Says of an error which region the goal is, where it is one.
+    pub(super) fn of_goal(self, query: &Query) -> Self {
+        let Query { goal, goal_within: within, .. } = *query;
+        if within == 0.0 || matches!(self, Self::StartBlocked(_)) {
+            return self;
+        }
+        Self::OfRegion { x: goal.x, y: goal.y, within, error: Box::new(self) }
+    }
+
     /// Whether it is the start, not the goal or the way between, that a person should look at.
     pub fn is_about_start(&self) -> bool {
         match self {
             Self::StartBlocked(_) | Self::OffMap { which: "start", .. } => true,
             Self::Exhausted(absence) => absence.at_fault == Some("start"),
+            Self::OfRegion { error, .. } => error.is_about_start(),
             _ => false,
         }
     }
@@ -210,6 +232,11 @@ impl Describe for SearchError {
             Self::Sampled { postures } => Diagnostic::failure("search/no-posture", self)
                 .hint("free the goal's joints or heading, give joint values that keep farther from obstacles, or lower `clearance_m`")
                 .number("postures", *postures),
+            Self::OfRegion { error, within, .. } => {
+                let mut out = error.diagnostic().number("goal_within_m", *within);
+                out.message = self.to_string();
+                out
+            }
             Self::Limit { labels } => Diagnostic::failure("search/limit", self)
                 .hint("use a coarser map or split the mission")
                 .number("labels", *labels),

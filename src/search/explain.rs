@@ -7,7 +7,7 @@ use super::heuristic::{self, NEIGHBOURS};
 use super::lattice::Lattice;
 use super::posture::Postures;
 use super::solve::{self, End, NoPath, Problem, Solver};
-use super::{Contact, Query, SearchPath, SearchState};
+use super::{Contact, Query, SearchPath, SearchState, region};
 use crate::geom::Pose2;
 use crate::robot::{Convex, RobotModel};
 
@@ -32,24 +32,30 @@ const SMALL: f64 = 0.25;
 pub(super) fn blocked<const W: usize>(problem: &Problem<'_>, postures: Postures, end: End) -> SearchError {
     let Problem { map, esdf, robot, query, options } = *problem;
     let collider = Collider::<W>::new(robot, esdf, map, options.clearance, postures);
-    let (pose, joints, headings) = match end {
-        End::Start => (query.start, &query.start_joints, vec![query.start.yaw]),
-        End::Goal => (query.goal, &query.goal_joints, solve::goal_headings(query)),
+    let lattice = Lattice::new(map);
+    let (pose, joints, headings, places) = match end {
+        End::Start => (query.start, &query.start_joints, vec![query.start.yaw], vec![[query.start.x, query.start.y]]),
+        End::Goal => {
+            (query.goal, &query.goal_joints, solve::goal_headings(query), region::places(query, &lattice).collect())
+        }
     };
     let postures: Vec<usize> =
         (0..collider.postures.count()).filter(|p| collider.postures.agrees(*p, end, joints)).collect();
-    let stride = (headings.len() * postures.len()).div_ceil(MOST_LOOKS).max(1);
-    let looks = headings.iter().flat_map(|yaw| postures.iter().map(|p| (*yaw, *p))).step_by(stride);
-    let seen = looks.map(|(yaw, posture)| {
+    let stride = (places.len() * headings.len() * postures.len()).div_ceil(MOST_LOOKS).max(1);
+    let looks = places.iter().flat_map(|place| {
+        let postures = &postures;
+        headings.iter().flat_map(move |yaw| postures.iter().map(|p| (Pose2::new(place[0], place[1], *yaw), *p)))
+    });
+    let seen = looks.step_by(stride).map(|(pose, posture)| {
         let exact: Vec<f64> =
             joints.iter().zip(collider.postures.joints(posture)).map(|(asked, own)| asked.unwrap_or(*own)).collect();
-        (collider.contact(Pose2 { yaw, ..pose }, &exact), exact)
+        (collider.contact(pose, &exact), exact)
     });
     let best = seen.max_by(|a, b| a.0.clearance.total_cmp(&b.0.clearance));
     let (contact, exact) = best.unwrap_or_else(|| (collider.contact(pose, &[]), Vec::new()));
     // Only joints that the compiler may choose are news.
     let chosen = named(robot, &exact).into_iter().zip(joints).filter(|(_, asked)| asked.is_none()).map(|(own, _)| own);
-    let nearest = nearest_free(&collider, &Lattice::new(map), pose, &headings, &postures);
+    let nearest = nearest_free(&collider, &lattice, pose, &headings, &postures);
     let blocked = Box::new(Blocked { contact, clearance: options.clearance, posture: chosen.collect(), nearest });
     match end {
         End::Start => SearchError::StartBlocked(blocked),
@@ -110,7 +116,14 @@ pub(super) fn absent<const W: usize>(
 ) -> SearchError {
     let Problem { map, query, options, .. } = solver.problem;
     let (lattice, core) = (&solver.lattice, solver.core);
-    let goal = Pose2 { yaw: query.goal_yaw.unwrap_or(0.0), ..query.goal };
+    // Of a region the place with the most room.
+    let room = |at: &[f64; 2]| {
+        let [i, j] = lattice.coordinates(at[0], at[1]).map(|v| v.round() as i32);
+        if lattice.contains(i, j) { core_clearances[lattice.index(i, j)] } else { f32::NEG_INFINITY }
+    };
+    let roomiest = region::places(query, lattice).max_by(|a, b| room(a).total_cmp(&room(b)));
+    let [x, y] = roomiest.filter(|_| query.goal_within > 0.0).unwrap_or([query.goal.x, query.goal.y]);
+    let goal = Pose2::new(x, y, query.goal_yaw.unwrap_or(0.0));
     let ends = [query.start, goal].map(|pose| core.centre(pose));
     let narrowest = heuristic::bottleneck(lattice, core_clearances, core.radius, ends[0], ends[1]);
     let least = heuristic::least_clearance(lattice, map.resolution, options.clearance);
@@ -133,7 +146,7 @@ pub(super) fn absent<const W: usize>(
         None
     };
     let core = core.radius + options.clearance;
-    let to_goal = closest.distance(query.goal);
+    let to_goal = (closest.distance(query.goal) - query.goal_within).max(0.0);
     SearchError::Exhausted(Box::new(Absence { expanded, closest, to_goal, at_fault, narrowest, core, tightest }))
 }
 

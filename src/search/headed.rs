@@ -346,7 +346,7 @@ mod tests {
 
     fn query(start: [f64; 3], goal: [f64; 3]) -> Query {
         let [start, goal] = [start, goal].map(|[x, y, yaw]| Pose2::new(x, y, yaw));
-        Query { start, start_joints: vec![], goal, goal_yaw: Some(goal.yaw), goal_joints: vec![] }
+        Query { start, start_joints: vec![], goal, goal_within: 0.0, goal_yaw: Some(goal.yaw), goal_joints: vec![] }
     }
 
     /// From round obstacles, with the map's edge as one more.

@@ -3,6 +3,7 @@
 //! but for the eight directions; where it says that a position is shut off, no motion of the robot gets there.
 
 use super::lattice::Lattice;
+use super::{Query, region};
 use crate::esdf::{self, Esdf};
 use crate::geom::Pose2;
 use crate::map::VoxelMap;
@@ -116,32 +117,30 @@ pub(super) fn least_clearance(lattice: &Lattice, resolution: f64, clearance: f64
 
 impl CostToGo {
     /// Distances of the core's centre from everywhere to where it is at the goal, through where it keeps `clearance`.
-    /// `goal_yaw`: `None`, any.
-    pub fn new(
-        lattice: &Lattice,
-        core: (Core, &[f32]),
-        resolution: f64,
-        clearance: f64,
-        goal: Pose2,
-        goal_yaw: Option<f64>,
-    ) -> Self {
+    pub fn new(lattice: &Lattice, core: (Core, &[f32]), resolution: f64, clearance: f64, query: &Query) -> Self {
         let (core, clearances) = core;
+        let Query { goal, goal_yaw, .. } = *query;
         let least = least_clearance(lattice, resolution, clearance);
         let mut tenths = vec![u32::MAX; clearances.len()];
         // Dial's buckets: all steps are 10 or 14.
         let mut buckets: [Vec<(i32, i32)>; 16] = Default::default();
         // Lattice positions around the centre at the goal; around the whole circle of them where any heading will do.
         let turns = if goal_yaw.is_some() { 1 } else { 72 };
+        // Of a region all where the core may be, if it is within the region: there the way ends.
+        let reach = region::reach(query) / lattice.step;
         for k in 0..turns {
             let yaw = goal_yaw.unwrap_or(std::f64::consts::TAU * f64::from(k) / f64::from(turns));
             let centre = core.centre(Pose2 { yaw, ..goal });
             let at = lattice.coordinates(centre[0], centre[1]);
-            for i in at[0].floor() as i32..=at[0].ceil() as i32 {
-                for j in at[1].floor() as i32..=at[1].ceil() as i32 {
-                    if lattice.contains(i, j) && tenths[lattice.index(i, j)] != 0 {
-                        tenths[lattice.index(i, j)] = 0;
-                        buckets[0].push((i, j));
-                    }
+            let range = |d: usize| (at[d] - reach).floor() as i32..=(at[d] + reach).ceil() as i32;
+            for (i, j) in range(0).flat_map(|i| range(1).map(move |j| (i, j))) {
+                if !lattice.contains(i, j) || tenths[lattice.index(i, j)] == 0 {
+                    continue;
+                }
+                let off = (f64::from(i) - at[0]).hypot(f64::from(j) - at[1]);
+                if reach == 0.0 || off <= reach + 1.42 && clearances[lattice.index(i, j)] >= least {
+                    tenths[lattice.index(i, j)] = 0;
+                    buckets[0].push((i, j));
                 }
             }
         }

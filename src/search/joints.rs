@@ -128,7 +128,14 @@ mod tests {
         };
         let pose = crate::geom::Pose2::default();
         let [start_joints, goal_joints] = [vec![None], vec![None]];
-        let query = super::super::Query { start: pose, start_joints, goal: pose, goal_yaw: None, goal_joints };
+        let query = super::super::Query {
+            start: pose,
+            start_joints,
+            goal: pose,
+            goal_within: 0.0,
+            goal_yaw: None,
+            goal_joints,
+        };
         Neighbours::new(&super::super::posture::Postures::new(&robot, &query, 0))
     }
 

@@ -22,6 +22,7 @@ mod obstacles;
 mod placed;
 mod posture;
 mod queue;
+mod region;
 mod roadmap;
 mod route;
 mod shortcut;
@@ -85,6 +86,8 @@ pub struct Query {
     pub start_joints: Vec<Option<f64>>,
     /// Exact goal position; its yaw only where `goal_yaw` says so.
     pub goal: Pose2,
+    /// Anywhere so near to that position will do, m; 0: there.
+    pub goal_within: f64,
     /// Heading at the goal; `None`: any.
     pub goal_yaw: Option<f64>,
     /// Joint values at the goal; `None`: any.
@@ -113,14 +116,19 @@ pub fn search(
 ) -> Result<SearchPath, SearchError> {
     let bounds = map.bounds();
     for (which, pose) in [("start", query.start), ("goal", query.goal)] {
-        let inside =
-            (bounds.min[0]..=bounds.max[0]).contains(&pose.x) && (bounds.min[1]..=bounds.max[1]).contains(&pose.y);
-        if !inside {
+        let beyond = |axis: usize, at: f64| (bounds.min[axis] - at).max(at - bounds.max[axis]).max(0.0);
+        let beyond = beyond(0, pose.x).hypot(beyond(1, pose.y));
+        if beyond > if which == "goal" { query.goal_within } else { 0.0 } {
             let [min, max] = [bounds.min, bounds.max];
             return Err(SearchError::OffMap { which, x: pose.x, y: pose.y, bounds: [min[0], max[0], min[1], max[1]] });
         }
     }
     let problem = Problem { map, esdf, robot, query, options };
+    if query.goal_within > 0.0
+        && let Some(path) = region::path(problem, 0..Postures::levels(robot))
+    {
+        return Ok(path);
+    }
     for level in 1..Postures::levels(robot) {
         if let Some(path) = quick::<{ posture::FEW_POSTURES / 64 }>(problem, Postures::new(robot, query, level - 1)) {
             return Ok(path);
@@ -132,6 +140,7 @@ pub fn search(
     } else {
         solve::<{ posture::MOST_POSTURES / 64 }>(problem, postures)
     }
+    .map_err(|error| error.of_goal(query))
 }
 
 /// Another path than [`search`] finds, by more postures of many joints than it looks at first; `None`: there are no more, or none was found
@@ -146,6 +155,9 @@ pub fn with_more_postures(
     let levels = Postures::levels(robot);
     let problem = Problem { map, esdf, robot, query, options };
     let postures = (levels > 1).then(|| Postures::new(robot, query, levels - 1))?;
+    if query.goal_within > 0.0 {
+        return region::path(problem, levels - 1..levels);
+    }
     quick::<{ posture::MOST_POSTURES / 64 }>(problem, postures)
 }
 

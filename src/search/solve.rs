@@ -12,7 +12,7 @@ use super::lattice::{self, Lattice};
 use super::posture::Postures;
 use super::route::{Grain, Route};
 use super::shortcut::{CheckedRoute, Shortcutter};
-use super::{Query, SearchMove, SearchOptions, SearchPath, SearchState};
+use super::{Query, SearchMove, SearchOptions, SearchPath, SearchState, region};
 use crate::esdf::Esdf;
 use crate::geom::{Pose2, wrap_angle};
 use crate::map::VoxelMap;
@@ -88,7 +88,13 @@ impl<'a, const W: usize> Solver<'a, W> {
         }
         let mut start_postures =
             free_postures(&collider, query.start, End::Start, &query.start_joints).ok_or(End::Start)?;
-        let mut goal_postures = goal_postures(&collider, query).ok_or(End::Goal)?;
+        let lattice = Lattice::new(map);
+        let mut goal_postures = if query.goal_within > 0.0 {
+            region::postures(&collider, &lattice, query)
+        } else {
+            goal_postures(&collider, query)
+        }
+        .ok_or(End::Goal)?;
         // Where an end leaves no other choice, samples in which links touch stay: the exact joint values may be apart.
         let mut touching = collider.touching();
         for postures in [&mut start_postures, &mut goal_postures] {
@@ -98,7 +104,7 @@ impl<'a, const W: usize> Solver<'a, W> {
             }
         }
         collider.only(collider.all().minus(touching));
-        let (lattice, core) = (Lattice::new(map), Core::new(robot));
+        let core = Core::new(robot);
         Ok(Self { problem, collider, lattice, core, start_postures, goal_postures, touching })
     }
 
@@ -112,6 +118,10 @@ impl<'a, const W: usize> Solver<'a, W> {
     /// The first that passes of the straight ways, those that count turns, and the guide's. None proves nothing.
     pub fn guided(&self) -> Option<SearchPath> {
         let Problem { query, options, .. } = self.problem;
+        // Its places are tried one by one, by `region`.
+        if query.goal_within > 0.0 {
+            return None;
+        }
         for route in astar::straight_to_goal(query, options) {
             if let Ok(path) = self.finish(&route, Grain::COARSE, &self.collider, 0) {
                 return Some(path);
@@ -225,7 +235,7 @@ impl<'a, const W: usize> Solver<'a, W> {
         let (lattice, core, clearance) = (&self.lattice, self.core, options.clearance);
         let core_clearances = heuristic::core_clearance(lattice, map, &core);
         let of_core = (core, &core_clearances[..]);
-        let cost_to_go = CostToGo::new(lattice, of_core, map.resolution, clearance, query.goal, query.goal_yaw);
+        let cost_to_go = CostToGo::new(lattice, of_core, map.resolution, clearance, query);
         let mut expanded_before = 0;
         for strict in [false, true] {
             let astar = AStar {
@@ -297,7 +307,7 @@ fn turn_cost(robot: &RobotModel) -> f64 {
 
 /// The postures and a way out of the one at an end, where no way that is there already leads out of it.
 fn with_way_out<const W: usize>(collider: &Collider<'_, W>, end: End, pose: Pose2, query: &Query) -> Option<Postures> {
-    if end == End::Goal && query.goal_yaw.is_none() {
+    if end == End::Goal && (query.goal_yaw.is_none() || query.goal_within > 0.0) {
         return None;
     }
     let postures = &collider.postures;
@@ -384,7 +394,8 @@ fn with_joints<const W: usize>(
     let last = postures[postures.len() - 1];
     let end = path.states[path.states.len() - 1].pose;
     let yaw = query.goal_yaw.map_or(end.yaw, |yaw| end.yaw + wrap_angle(yaw - end.yaw));
-    let end = Pose2 { yaw, x: query.goal.x, y: query.goal.y };
+    let [x, y] = if query.goal_within > 0.0 { [end.x, end.y] } else { [query.goal.x, query.goal.y] };
+    let end = Pose2 { x, y, yaw };
     path.states.last_mut().expect("never empty").pose = end;
     path.then_to(SearchState { pose: end, joints: exact(&query.goal_joints, last) }, SearchMove::Still);
     if path.moves.is_empty() {

@@ -110,6 +110,7 @@ fn across(joint: Option<f64>) -> Query {
         start: Pose2::new(0.7, 1.0, 0.3),
         start_joints: vec![joint],
         goal: Pose2::new(2.4, 1.05, 0.0),
+        goal_within: 0.0,
         goal_yaw: None,
         goal_joints: vec![None],
     }
@@ -241,6 +242,7 @@ fn the_end_that_is_shut_in_is_named() {
         start,
         start_joints: vec![],
         goal,
+        goal_within: 0.0,
         goal_yaw: Some(goal.yaw),
         goal_joints: vec![],
     };
@@ -315,6 +317,87 @@ fn a_goal_straight_behind_is_backed_up_to_where_that_is_allowed() {
     assert!(moves(false).iter().all(|m| *m != SearchMove::Reverse));
 }
 
+/// Where a path ends, from the query's goal, m.
+fn off_goal(path: &SearchPath, query: &Query) -> f64 {
+    path.states[path.states.len() - 1].pose.distance(query.goal)
+}
+
+#[test]
+fn a_goal_of_any_place_within_a_radius_is_reached_at_its_near_rim() {
+    let robot = scr_db();
+    let map = room_with_opening(1.0, 0.45);
+    let exact = find(&map, &robot, &across(None), 0.03).expect("there is a way");
+    let query = Query { goal_within: 0.4, ..across(None) };
+    let path = find(&map, &robot, &query, 0.03).expect("there is a way");
+    let off = off_goal(&path, &query);
+    assert!(off < 0.4 && off > 0.39, "{off}");
+    assert!((exact.length() - path.length() - 0.4).abs() < 0.05, "{} {}", exact.length(), path.length());
+    // A heading that is asked for is kept there.
+    let query = Query { goal_yaw: Some(1.0), goal_joints: vec![Some(0.5)], ..query };
+    let path = find(&map, &robot, &query, 0.03).expect("there is a way");
+    let end = &path.states[path.states.len() - 1];
+    assert!(off_goal(&path, &query) < 0.4 && crate::geom::wrap_angle(end.pose.yaw - 1.0).abs() < 1e-9);
+    assert_eq!(end.joints, [0.5]);
+    // Who is there already stays.
+    let query = Query { goal_within: 2.0, ..across(None) };
+    assert_eq!(find(&map, &robot, &query, 0.03).expect("there").length(), 0.0);
+}
+
+#[test]
+fn a_region_whose_middle_is_blocked_is_reached_where_it_is_free() {
+    let robot = small_box();
+    let mut map = VoxelMap::new(0.05, [0.0; 3], [60, 40, 20], Unknown::Occupied);
+    fill(&mut map, [2.0, 0.8, 0.0], [2.6, 1.4, 0.5]);
+    // The near side is blocked too: what is free lies behind the block.
+    fill(&mut map, [1.7, 0.3, 0.0], [2.0, 1.9, 0.5]);
+    for goal_yaw in [None, Some(0.5)] {
+        let query = Query {
+            start: Pose2::new(0.7, 1.0, 0.3),
+            start_joints: vec![],
+            goal: Pose2::new(2.3, 1.1, goal_yaw.unwrap_or(0.0)),
+            goal_within: 0.52,
+            goal_yaw,
+            goal_joints: vec![],
+        };
+        assert!(matches!(
+            find(&map, &robot, &Query { goal_within: 0.0, ..query.clone() }, 0.02),
+            Err(SearchError::GoalBlocked(_))
+        ));
+        let path = find(&map, &robot, &query, 0.02).expect("there is room behind the block");
+        assert!(off_goal(&path, &query) <= 0.52);
+        assert!(distance_along(&map, &robot, &path, 12) > 0.02 - 1e-3);
+        // A radius within which the robot fits nowhere.
+        match find(&map, &robot, &Query { goal_within: 0.3, ..query }, 0.02) {
+            Err(error @ SearchError::OfRegion { .. }) => {
+                let text = crate::diag::Describe::diagnostic(&error);
+                assert_eq!(text.code, "search/goal-blocked");
+                assert!(text.message.ends_with("the goal is any place within 0.3 m of (2.300, 1.100)"), "{text:?}");
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn that_no_place_of_a_region_can_be_reached_is_proven() {
+    let robot = small_box();
+    let mut map = VoxelMap::new(0.05, [0.0; 3], [60, 40, 20], Unknown::Occupied);
+    fill(&mut map, [1.4, 0.0, 0.0], [1.6, 2.0, 0.5]);
+    let query = Query { start_joints: vec![], goal_joints: vec![], goal_within: 0.3, ..across(None) };
+    match find(&map, &robot, &query, 0.02) {
+        Err(error @ SearchError::OfRegion { .. }) => {
+            let fault = crate::diag::Describe::diagnostic(&error);
+            assert_eq!(fault.code, "search/no-way");
+            assert!(fault.message.contains("closed off even for a point"), "{fault:?}");
+        }
+        other => panic!("{other:?}"),
+    }
+    // One that reaches through the wall is reached on this side of it.
+    let query = Query { goal_within: 1.4, ..query };
+    let path = find(&map, &robot, &query, 0.02).expect("part of it is here");
+    assert!(off_goal(&path, &query) <= 1.4 && path.states.iter().all(|s| s.pose.x < 1.4));
+}
+
 /// Whether a lattice state is reached by plain breadth-first search with every move sampled.
 fn reachable(map: &VoxelMap, robot: &RobotModel, from: LatticeState, to: LatticeState, clearance: f64) -> bool {
     let lattice = Lattice::new(map);
@@ -387,7 +470,7 @@ proptest! {
         let from = LatticeState { i: ends.0, j: ends.1, heading: ends.2 };
         let to = LatticeState { i: ends.3, j: ends.4, heading: ends.5 };
         let (start, goal) = (lattice.pose(from), lattice.pose(to));
-        let query = Query { start, start_joints: vec![], goal, goal_yaw: Some(goal.yaw), goal_joints: vec![] };
+        let query = Query { start, start_joints: vec![], goal, goal_within: 0.0, goal_yaw: Some(goal.yaw), goal_joints: vec![] };
         let clearance = 0.012;
         prop_assume!(distance(&map, &robot, start, &[]) > clearance + 0.003 && distance(&map, &robot, goal, &[]) > clearance + 0.003);
         match find(&map, &robot, &query, clearance) {

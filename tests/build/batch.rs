@@ -166,3 +166,44 @@ fn a_build_that_is_killed_leaves_whole_folders_and_the_next_one_sweeps_up() {
     let left: Vec<String> = sandbox.list("out").into_iter().filter(|name| name.contains(".trajc-")).collect();
     assert_eq!(left, [".trajc-build"]);
 }
+
+#[test]
+fn a_mission_that_starts_where_another_ends_is_built_after_it() {
+    let sandbox = Sandbox::new();
+    let text = sandbox.text("missions/a.yaml");
+    let from = |file: &str, goal: &str| {
+        text.replace("start: {x_m: 0.6, y_m: 1.5, yaw: 0deg}", &format!("start: {{file: ../out/{file}/commands.csv}}"))
+            .replace("goal: {x_m: 3.4, y_m: 1.5, yaw: 0deg}", &format!("goal: {{{goal}}}"))
+    };
+    // By name they come the other way round.
+    sandbox.remove("missions/a.yaml");
+    sandbox.write("missions/c.yaml", &text);
+    sandbox.write("missions/b.yaml", from("c", "x_m: 3.4, y_m: 2.4"));
+    sandbox.write("missions/a.yaml", from("b", "x_m: 0.6, y_m: 1.5"));
+    let document = built(&sandbox, &["-j", "2"], 0);
+    assert_eq!(of_status(&document, "certified"), ["c", "b", "a"]);
+    assert!(to_do(&sandbox).is_empty());
+    let made = |name: &str| sandbox.text(&format!("out/{name}/commands.csv"));
+    let before = ["a", "b", "c"].map(made);
+    sandbox.remove("out/c/report.html");
+    let names = ["c", "b", "a"].map(str::to_owned);
+    let why = ["missing out/c/report.html", "out/c/commands.csv is made first", "out/b/commands.csv is made first"];
+    assert_eq!(to_do(&sandbox), names.into_iter().zip(why.map(str::to_owned)).collect::<Vec<_>>());
+    built(&sandbox, &["-j", "2"], 0);
+    assert_eq!(["a", "b", "c"].map(made), before, "the same input, the same bytes");
+    // Where only the last one is built, a change of what it starts from is a change of it.
+    let alone = |code| built(&sandbox, &["missions/b.yaml", "-n"], code);
+    assert_eq!(of_status(&alone(0), "up_to_date"), ["b"]);
+    sandbox.edit("missions/c.yaml", "y_m: 1.5, yaw: 0deg}\nclearance", "y_m: 1.4, yaw: 0deg}\nclearance");
+    sandbox.run(&["compile", "missions/c.yaml"]).expect(0);
+    let document = alone(0);
+    assert_eq!(document["missions"][0]["why"][0], "changed out/c/commands.csv");
+    // What has no end leaves no start.
+    sandbox.edit("missions/c.yaml", "goal: {x_m: 3.4", "goal: {x_m: 2.0");
+    let run = sandbox.run(&["build", "-k"]).expect(1);
+    assert!(run.stderr.contains("it starts where `out/c/commands.csv` ends, which"), "{}", run.stderr);
+    assert!(!sandbox.exists("out/a/commands.csv"));
+    sandbox.write("missions/c.yaml", from("a", "x_m: 3.4, y_m: 1.5"));
+    let run = sandbox.run(&["build", "-k"]).expect(2);
+    golden("build_cycle", &run.stderr);
+}

@@ -141,6 +141,7 @@ fn rewritten(bytes: &[u8], change: impl Fn(&mut Texts)) -> Vec<u8> {
         urdf: &texts.urdf,
         report: &texts.report,
         path_csv: None,
+        start_file: None,
         meshes: &[],
     };
     mcap::write(&inputs).expect("a command file")

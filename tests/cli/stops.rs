@@ -76,6 +76,75 @@ fn a_stretch_without_a_way_is_named() {
 }
 
 #[test]
+fn a_zone_is_driven_slowly_and_that_is_proven() {
+    let sandbox = Sandbox::new();
+    sandbox.run(&["compile", "missions/a.yaml"]).expect(0);
+    let free = rows(&sandbox, &["time_s"]).len();
+    let zones = "speed_zones:\n    - {polygon_m: [[1.6, 0.0], [2.4, 0.0], [2.4, 3.0], [1.6, 3.0]], speed_mps: 0.15}\n    \
+                 - {polygon_m: [[0.0, 2.9], [0.1, 2.9], [0.1, 3.0]], speed_mps: 0.05}";
+    sandbox.edit("missions/a.yaml", "resolution_m: 0.05", &format!("resolution_m: 0.05\n  {zones}"));
+    // The commands from before are too fast there.
+    let run = sandbox.run(&["check", "out/a/commands.csv", "--mission", "missions/a.yaml"]).expect(1);
+    let words = run.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("in or at speed_zones[0], where 0.15 m/s are allowed"), "{words}");
+    for law in ["auto", "minco", "fixed_point"] {
+        sandbox.edit("missions/a.yaml", "clearance_m: 0.05", &format!("clearance_m: 0.05\ntime_law: {law}"));
+        let run = sandbox.run(&["compile", "missions/a.yaml"]).expect(0);
+        assert!(
+            run.stdout.contains("\n  slow zones  0.1") && run.stdout.contains("/0.15 m/s, not entered\n"),
+            "{}",
+            run.stdout
+        );
+        let report: Value = serde_json::from_slice(&sandbox.read("out/a/report.json")).expect("JSON");
+        let proven = &report["certificate"]["speed_zones"];
+        let peak = proven[0]["peak_mps"].as_f64().expect("a number");
+        assert!(peak <= 0.15 && peak > 0.1, "{law}: {peak}");
+        assert!(proven[1].get("peak_mps").is_none());
+        let rows = rows(&sandbox, &["x_m", "v_mps"]);
+        let inside = rows.iter().filter(|row| (1.6..=2.4).contains(&row[0])).map(|row| row[1]);
+        assert!(inside.fold(0.0, f64::max) <= peak);
+        if law == "auto" {
+            assert!(rows.iter().any(|row| row[1] > 0.25), "fast elsewhere");
+            assert!(rows.len() > free + 20, "{} {free}", rows.len());
+        }
+        sandbox.run(&["check", "out/a/commands.mcap"]).expect(0);
+        sandbox.edit("missions/a.yaml", &format!("\ntime_law: {law}"), "");
+    }
+    sandbox.run(&["inspect", "missions/a.yaml", "--plot", "a.svg"]).expect(0);
+    assert!(sandbox.text("a.svg").contains("0.15 m/s"));
+    sandbox.run(&["compile", "missions/a.yaml", "--report", "svg"]).expect(0);
+    assert!(sandbox.text("out/a/report.svg").contains("speed zone"));
+}
+
+#[test]
+fn a_goal_with_a_radius_is_proven_as_that_region() {
+    let sandbox = sandbox_with("via: [{x_m: 2.0, y_m: 0.6, within_m: 0.2, yaw: any}]");
+    let goal = "goal: {x_m: 3.4, y_m: 1.5, yaw: 0deg}";
+    sandbox.edit("missions/a.yaml", goal, "goal: {x_m: 3.4, y_m: 1.5, within_m: 0.4, yaw: any}");
+    let run = sandbox.run(&["compile", "missions/a.yaml"]).expect(0);
+    assert!(run.stdout.contains(" from its middle; allowed: 400 mm\n"), "{}", run.stdout);
+    let report: Value = serde_json::from_slice(&sandbox.read("out/a/report.json")).expect("JSON");
+    let proof = &report["certificate"];
+    let off = proof["end_point_error_m"].as_f64().expect("a number");
+    let last = rows(&sandbox, &["x_m", "y_m"]).pop().expect("rows");
+    assert!(off < 0.4 && off > 0.3 && ((last[0] - 3.4).hypot(last[1] - 1.5) - off).abs() < 1e-6, "{off} {last:?}");
+    assert_eq!(proof["goal_within_m"], 0.4);
+    let via = proof["vias"][0]["point_error_m"].as_f64().expect("a number");
+    assert!(via < 0.2 && via > 0.1, "{via}");
+    sandbox.run(&["check", "out/a/commands.mcap"]).expect(0);
+    // What was asked is what is proven: a smaller region is another one.
+    sandbox.edit("missions/a.yaml", "within_m: 0.4", "within_m: 0.39");
+    let run = sandbox.run(&["check", "out/a/commands.csv", "--mission", "missions/a.yaml"]).expect(1);
+    assert!(run.stdout.contains("from the goal (390 mm allowed)"), "{}", run.stdout);
+    sandbox.run(&["inspect", "missions/a.yaml", "--plot", "a.svg"]).expect(0);
+    assert!(sandbox.text("a.svg").contains("any place will do"));
+    // The post's own place, and nothing that is free around it.
+    sandbox.edit("missions/a.yaml", "{x_m: 3.4, y_m: 1.5, within_m: 0.39", "{x_m: 1.95, y_m: 1.5, within_m: 0.1");
+    let run = sandbox.run(&["compile", "missions/a.yaml"]).expect(1);
+    assert!(run.stderr.contains("the goal is any place within 0.1 m of (1.950, 1.500)"), "{}", run.stderr);
+}
+
+#[test]
 fn areas_and_boxes_of_the_mission_are_driven_around_and_are_in_the_proof() {
     let south = "keep_out: [{polygon_m: [[1.6, 0.0], [2.4, 0.0], [2.0, 1.4]]}]";
     let north = "boxes: [{min_m: [1.8, 1.6, 0.0], max_m: [2.2, 3.0, 0.2]}]";

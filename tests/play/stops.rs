@@ -32,7 +32,7 @@ fn a_mission_that_is_cut_keeps_its_limits_and_its_clearance() {
             let task = Task {
                 start,
                 start_joints: table.rows[0].joint_positions.clone(),
-                goal: Goal { x: end.x, y: end.y, yaw: None, joints: open },
+                goal: Goal { x: end.x, y: end.y, within: 0.0, yaw: None, joints: open },
                 clearance: inputs.mission.clearance - ASIDE,
                 reverse: inputs.mission.reverse,
             };

@@ -82,6 +82,7 @@ fn the_last_difference_to_rest_counts() {
     task.goal = crate::certify::Goal {
         x: 1.0 + 0.03 * 0.5f64.cos(),
         y: 2.0 + 0.03 * 0.5f64.sin(),
+        within: 0.0,
         yaw: None,
         joints: vec![None],
     };

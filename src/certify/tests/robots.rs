@@ -118,6 +118,7 @@ pub(crate) fn commands(
     let goal = Goal {
         x: last.pose.x,
         y: last.pose.y,
+        within: 0.0,
         yaw: Some(last.pose.yaw),
         joints: last.joint_positions.iter().map(|q| Some(*q)).collect(),
     };

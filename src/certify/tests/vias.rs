@@ -1,20 +1,29 @@
 use nalgebra::Isometry3;
 
 use super::robots::*;
-use crate::certify::{Certificate, END_ANGLE_TOLERANCE, END_POINT_TOLERANCE, Goal, RefusalKind, Via, certify_through};
+use crate::certify::{
+    Certificate, Demands, END_ANGLE_TOLERANCE, END_POINT_TOLERANCE, Goal, RefusalKind, Task, Via, certify_through,
+};
+use crate::command::CommandTable;
 use crate::geom::Pose2;
+use crate::robot::RobotModel;
 
 /// Drives 0.1 m along x in 1 s, stands for 0.3 s, drives as far again; a joint goes from 0 to 0.5 while it first drives.
 fn judged(vias: &[Via]) -> Certificate {
+    let (robot, table, task) = motion();
+    certify_through(&table, &robot, None, &task, Demands { vias, zones: &[] })
+}
+
+fn motion() -> (RobotModel, CommandTable, Task) {
     let robot = with_body(with_joint(bare_robot(), false), 0, Isometry3::identity(), [0.0, 1.0, 0.0], (0, 1.0, 0.0));
     let drive = |rate: f64| std::iter::repeat_n((0.1, 0.0, vec![rate]), 10);
     let held: Vec<_> = drive(0.5).chain(std::iter::repeat_n((0.0, 0.0, vec![0.0]), 3)).chain(drive(0.0)).collect();
     let (table, task) = commands(&robot, Pose2::default(), &[0.0], 0.1, &held);
-    certify_through(&table, &robot, None, &task, vias)
+    (robot, table, task)
 }
 
 fn via(x: f64, dwell: f64) -> Via {
-    Via { place: Goal { x, y: 0.0, yaw: None, joints: vec![None] }, dwell }
+    Via { place: Goal { x, y: 0.0, within: 0.0, yaw: None, joints: vec![None] }, dwell }
 }
 
 /// Times at which vias are reached, or what is said of the first one that is not.
@@ -61,7 +70,7 @@ fn stops_come_in_their_order_and_each_moment_counts_once() {
 #[test]
 fn headings_joints_and_distances_are_judged_like_the_goals() {
     let with = |yaw: Option<f64>, joint: Option<f64>, x: f64| {
-        let place = Goal { x, y: 0.0, yaw, joints: vec![joint] };
+        let place = Goal { x, y: 0.0, within: 0.0, yaw, joints: vec![joint] };
         judged(&[Via { place, dwell: 0.0 }]).holds()
     };
     assert!(with(Some(std::f64::consts::TAU), Some(0.5), 0.1));
@@ -70,5 +79,20 @@ fn headings_joints_and_distances_are_judged_like_the_goals() {
         assert_eq!(with(Some(angle), None, 0.1), good);
         assert_eq!(with(None, Some(0.5 - angle), 0.1), good);
         assert_eq!(with(None, None, 0.1 + scale * END_POINT_TOLERANCE), good);
+    }
+}
+
+#[test]
+fn a_goal_or_via_with_a_radius_is_the_disc_and_nothing_more() {
+    for (scale, good) in [(1.0 - 1e-9, true), (1.0 + 1e-9, false)] {
+        // The motion stands at 0.1 m, and ends at 0.2 m.
+        let region = |x: f64| Goal { x, y: 0.0, within: 0.05 / scale, yaw: None, joints: vec![None] };
+        assert_eq!(judged(&[Via { place: region(0.15), dwell: 0.0 }]).holds(), good);
+        let (robot, table, mut task) = motion();
+        task.goal = Goal { y: 0.03, ..region(0.16) };
+        let certificate = certify_through(&table, &robot, None, &task, Demands::default());
+        assert_eq!(certificate.holds(), good, "{:?}", certificate.refusals);
+        assert!((certificate.end_point_error - 0.05).abs() < 1e-12);
+        assert_eq!(certificate.refusals.iter().any(|r| r.message.contains("50.000 mm from the goal")), !good);
     }
 }

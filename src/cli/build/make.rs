@@ -13,7 +13,7 @@ use super::state::{self, Ended, Making, State};
 use crate::cli::inputs::{self, Disk};
 use crate::cli::output;
 use crate::cli::products::{ProductArgs, Products, publish};
-use crate::diag::{Diagnostics, Severity};
+use crate::diag::{Diagnostic, Diagnostics, Severity};
 use crate::pipeline::{self, Inputs, World};
 use crate::report::schema::{InputFile, InputsPart};
 
@@ -66,6 +66,17 @@ impl Site<'_> {
     }
 
     fn compile(&self, job: &Job, mission: &Found) -> Result<Made, Diagnostics> {
+        if let Some((_, file)) = &job.after
+            && !self.start.join(file).is_file()
+        {
+            let message =
+                format!("it starts where `{}` ends, which another mission of this build has not made", file.display());
+            let hint = "the message about that mission says why it has no commands";
+            return Err(Diagnostic::failure("build/no-start", message)
+                .file(mission.path.display().to_string())
+                .hint(hint)
+                .into());
+        }
         let There { disk, inputs, named, world, timings } = self.world(job.map.as_ref(), mission)?;
         let outcome = pipeline::compile_on(&inputs, named, world, &self.args.options(), &mut |_| {});
         if let Some(faults) = outcome.diagnostics.as_ref().filter(|d| d.severity() == Severity::BadInput) {

@@ -4,7 +4,7 @@
 //! reads it and builds its distance field; meanwhile others take missions on other maps. When no mission is left that needs it, a map
 //! is dropped.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
@@ -24,6 +24,8 @@ pub struct Job {
     pub index: usize,
     /// The map that it shares with others; `None`: with nobody.
     pub map: Option<MapKey>,
+    /// The mission that must be done before, by its place in the list, and which of its files is read.
+    pub after: Option<(usize, PathBuf)>,
 }
 
 /// A map as the first mission on it found it.
@@ -46,7 +48,8 @@ pub fn map_key(mission: &Mission, path: &Path) -> Option<MapKey> {
         let folder = folder_of(Path::new(&mission.source.name));
         (tidy(&folder.join(&mission.robot)), &mission.limits)
     });
-    let MapSpec { file: _, resolution, height, unknown, origin, keep_out, boxes } = spec;
+    // Zones say nothing of cells.
+    let MapSpec { file: _, resolution, height, unknown, origin, keep_out, boxes, speed_zones: _ } = spec;
     Some(format!("{path:?} {resolution:?} {height:?} {unknown:?} {origin:?} {keep_out:?} {boxes:?} {robot:?}"))
 }
 
@@ -68,6 +71,8 @@ struct Entry {
 struct Inner {
     pending: Vec<Job>,
     maps: BTreeMap<MapKey, Entry>,
+    /// Missions that are not done.
+    open: BTreeSet<usize>,
     stopped: bool,
 }
 
@@ -88,9 +93,10 @@ impl Schedule {
                 first.entry(map.clone()).or_insert(job.index);
             }
         }
+        let open = jobs.iter().map(|job| job.index).collect();
         let mut pending = jobs;
         pending.sort_by_key(|job| (job.map.as_ref().map_or(job.index, |map| first[map]), job.index));
-        Self { inner: Mutex::new(Inner { pending, maps, stopped: false }), changed: Condvar::new() }
+        Self { inner: Mutex::new(Inner { pending, maps, open, stopped: false }), changed: Condvar::new() }
     }
 
     fn inner(&self) -> MutexGuard<'_, Inner> {
@@ -98,19 +104,20 @@ impl Schedule {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The next mission whose map nobody is making at the moment; waits for one. `None`: there is none left, or no more is to begin.
+    /// The next mission whose map nobody is making at the moment, and that begins where no mission ends that is not done; waits for one. `None`: there is none left, or no more is to begin.
     pub fn take(&self) -> Option<Job> {
         let mut inner = self.inner();
         loop {
             if inner.stopped || inner.pending.is_empty() {
                 return None;
             }
-            let Inner { pending, maps, .. } = &mut *inner;
+            let Inner { pending, maps, open, .. } = &mut *inner;
             let making = |job: &Job| {
                 let entry = job.map.as_ref().and_then(|map| maps.get(map));
                 entry.is_some_and(|entry| matches!(entry.progress, Progress::Making))
             };
-            if let Some(at) = pending.iter().position(|job| !making(job)) {
+            let early = |job: &Job| job.after.as_ref().is_some_and(|(first, _)| open.contains(first));
+            if let Some(at) = pending.iter().position(|job| !making(job) && !early(job)) {
                 let job = pending.remove(at);
                 if let Some(entry) = job.map.as_ref().and_then(|map| maps.get_mut(map))
                     && matches!(entry.progress, Progress::Absent)
@@ -149,6 +156,7 @@ impl Schedule {
     pub fn done(&self, job: &Job) {
         let mut dropped = None;
         let mut inner = self.inner();
+        inner.open.remove(&job.index);
         if let Some(map) = &job.map
             && let Some(entry) = inner.maps.get_mut(map)
         {
@@ -180,7 +188,7 @@ mod tests {
     use crate::mission::Unknown;
 
     fn schedule(maps: &[Option<&str>]) -> Schedule {
-        let job = |(index, map): (usize, &Option<&str>)| Job { index, map: map.map(str::to_owned) };
+        let job = |(index, map): (usize, &Option<&str>)| Job { index, map: map.map(str::to_owned), after: None };
         Schedule::new(maps.iter().enumerate().map(job).collect())
     }
 
@@ -246,6 +254,22 @@ mod tests {
         for (i, one) in keys.iter().enumerate() {
             assert!(keys[..i].iter().all(|other| other != one), "{one:?}");
         }
+    }
+
+    #[test]
+    fn who_starts_where_another_ends_waits_for_it() {
+        let job = |index, after: Option<usize>| Job { index, map: None, after: after.map(|a| (a, PathBuf::from("f"))) };
+        let s = Schedule::new(vec![job(0, None), job(1, Some(0)), job(2, Some(7)), job(3, Some(1))]);
+        let first = s.take().expect("a mission");
+        assert_eq!((first.index, taken(&s)), (0, Some(2)), "mission 7 is not of this build");
+        std::thread::scope(|scope| {
+            let other = scope.spawn(|| s.take().expect("the second mission"));
+            s.done(&first);
+            let second = other.join().expect("no panic");
+            assert_eq!(second.index, 1);
+            s.done(&second);
+        });
+        assert_eq!([taken(&s), taken(&s)], [Some(3), None]);
     }
 
     #[test]

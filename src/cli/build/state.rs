@@ -133,6 +133,8 @@ pub enum Stale {
     Options,
     /// Started in another folder: files are spelled in another way.
     Elsewhere,
+    /// Another mission of this build writes this input anew.
+    After(PathBuf),
     /// These inputs changed.
     Changed(Vec<PathBuf>),
     /// These inputs are gone.
@@ -157,6 +159,7 @@ impl std::fmt::Display for Stale {
             Self::Program => "another trajc".to_owned(),
             Self::Options => "other options".to_owned(),
             Self::Elsewhere => "built from another folder".to_owned(),
+            Self::After(path) => format!("{} is made first", path.display()),
             Self::Changed(paths) => list("changed", paths),
             Self::Gone(paths) => list("gone", paths),
             Self::Appeared(paths) => list("appeared", paths),
@@ -184,6 +187,11 @@ impl State {
             outputs: files.iter().map(output).collect(),
             ended,
         }
+    }
+
+    /// Files that were read, as build systems spell them.
+    pub fn reads(&self) -> impl Iterator<Item = &Path> {
+        self.inputs.iter().map(|input| input.path.as_path())
     }
 
     /// What an output folder says of itself.

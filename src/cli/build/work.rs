@@ -101,7 +101,7 @@ mod tests {
         keep_going: bool,
         make: &(dyn Fn(&Job) -> Result<Made, Diagnostics> + Sync),
     ) -> Vec<Finished> {
-        let schedule = Schedule::new((0..8).map(|index| Job { index, map: None }).collect());
+        let schedule = Schedule::new((0..8).map(|index| Job { index, map: None, after: None }).collect());
         let mut done = Vec::new();
         work(&schedule, workers, keep_going, make, &mut |event| {
             if let Event::Done(finished) = event {

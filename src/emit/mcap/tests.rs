@@ -44,6 +44,7 @@ pub fn file(table: &CommandTable, base_from_root: Isometry3<f64>, meshes: &[(Str
         urdf: URDF,
         report: REPORT,
         path_csv: None,
+        start_file: None,
         meshes,
     };
     write(&inputs).expect("a good table")
@@ -87,6 +88,7 @@ fn times_that_stamps_cannot_hold_are_refused() {
             urdf: URDF,
             report: REPORT,
             path_csv: None,
+            start_file: None,
             meshes: &[],
         };
         let error = write(&inputs).expect_err("not in stamps");

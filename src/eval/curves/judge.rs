@@ -151,7 +151,7 @@ fn compiled(trajectory: &Trajectory, robot: &RobotModel, held: Held, law: TimeLa
     let task = Task {
         start: profile.pose(0.0),
         start_joints: profile.joints(0.0),
-        goal: Goal { x: end.x, y: end.y, yaw: Some(end.yaw), joints: vec![None; robot.joints.len()] },
+        goal: Goal { x: end.x, y: end.y, within: 0.0, yaw: Some(end.yaw), joints: vec![None; robot.joints.len()] },
         clearance: 0.0,
         reverse: false,
     };

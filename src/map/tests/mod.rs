@@ -21,6 +21,7 @@ fn spec(height: [f64; 2]) -> MapSpec {
         origin: None,
         keep_out: Vec::new(),
         boxes: Vec::new(),
+        speed_zones: Vec::new(),
     }
 }
 

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 fn spec(keep_out: Vec<KeepOut>, boxes: Vec<Aabb>) -> MapSpec {
     let file = PathBuf::from("map");
     let (resolution, origin, height, unknown) = (None, None, Some([0.0, 1.0]), Unknown::Occupied);
-    MapSpec { file, resolution, height, unknown, origin, keep_out, boxes }
+    MapSpec { file, resolution, height, unknown, origin, keep_out, boxes, speed_zones: vec![] }
 }
 
 /// A room of 4 x 3 m in cells of 10 cm with its corner at (-1, 2), one layer high from z 0.

@@ -6,6 +6,7 @@ pub mod joint;
 mod own_links;
 pub mod speed;
 pub mod turn;
+pub mod zone;
 
 use crate::math::smooth::smooth_positive;
 use crate::robot::RobotModel;

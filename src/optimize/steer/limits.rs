@@ -1,7 +1,7 @@
 //! What a sample exceeds of the limits of base, wheels and joints: squares of what is too much.
 
 use super::hermite::{Basis, DATA};
-use super::integral::ByData;
+use super::integral::{ByData, Integral};
 use super::problem::Problem;
 
 /// Backing up weighs as much as exceeding the speed limit by so many times as much.
@@ -88,6 +88,48 @@ impl<F> Problem<'_, F> {
             }
         }
         cost
+    }
+
+    /// What the base exceeds of the speed allowed where it is: linear in the speed, and less allowed the nearer a zone is.
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn zone_limit(
+        &mut self,
+        piece: usize,
+        basis: &Basis,
+        arc: &[f64; 4],
+        rates: &[f64; 4],
+        path: &Integral<'_>,
+        start: [f64; 2],
+        weight: f64,
+    ) -> f64 {
+        let moved = path.position();
+        let Some((square, slope)) = self.zones.square_at([start[0] + moved[0], start[1] + moved[1]]) else {
+            return 0.0;
+        };
+        let (direction, allowed) = (self.directions[piece], square.sqrt());
+        let share = direction * arc[1] * rates[1] / allowed;
+        let value = share - 1.0;
+        if value <= 0.0 {
+            return 0.0;
+        }
+        // d(share) = d(speed) / allowed - share d(square) / 2 square.
+        let by_place = slope.map(|s| -0.5 * share * s / square);
+        let (size, time) = (self.local.size, self.local.time);
+        let jacobian = &mut self.jacobian[..size];
+        jacobian.fill(0.0);
+        for (axis, own) in by_place.into_iter().enumerate() {
+            for (entry, by) in jacobian.iter_mut().zip(path.by_data(axis)) {
+                *entry += own * by;
+            }
+            jacobian[time + 1 + axis] = own;
+        }
+        for (entry, by) in jacobian[DATA..2 * DATA].iter_mut().zip(&basis.rows[1]) {
+            *entry += direction * rates[1] / allowed * by;
+        }
+        // The weight grows with the duration, the speed falls with it.
+        jacobian[time] = 0.5 * value - share;
+        self.local.add(jacobian, weight * value, weight);
+        0.5 * weight * value * value
     }
 
     /// Limits of the joints: speed, acceleration, jerk, position. Leaves the joints' values in `joints`.

@@ -16,6 +16,7 @@ use super::OptimizeOptions;
 use super::contour::Contour;
 use super::penalty::Limits;
 use super::penalty::clearance::{ClearancePenalty, DistanceField};
+use super::penalty::zone::ZonePenalty;
 use super::sections::still;
 use crate::math::poly::{Piece, PiecewisePoly};
 use crate::robot::RobotModel;
@@ -123,6 +124,7 @@ pub fn optimize_steered<F: DistanceField>(
     }
     let counts: Vec<usize> = (0..layout.pieces).map(|k| samples(layout, k, &x, own, swing.of(layout, k, &x))).collect();
     let mut problem = Problem::new(robot, field, clearance, first.directions, first.fixed, &counts, weights);
+    problem.zones = ZonePenalty::new(&options.zones, limits.acceleration);
     let solver =
         SolverOptions { max_iterations: own.max_iterations, tolerance: own.tolerance, gap_tolerance: GAP_TOLERANCE };
     let forwards = path.moves.iter().all(|step| *step != SearchMove::Reverse);

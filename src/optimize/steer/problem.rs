@@ -18,6 +18,7 @@ use super::near::Contacts;
 use crate::math::banded::Banded;
 use crate::optimize::penalty::Limits;
 use crate::optimize::penalty::clearance::{ClearancePenalty, DistanceField};
+use crate::optimize::penalty::zone::ZonePenalty;
 use crate::robot::RobotModel;
 
 /// Weights of the cost; time counts 1 a second.
@@ -73,6 +74,8 @@ pub(super) struct Problem<'a, F> {
     /// +1 or -1 a piece: which way its base drives.
     pub(super) directions: Vec<f64>,
     pub(super) fixed: Vec<bool>,
+    /// Where the base is to be slow.
+    pub(super) zones: ZonePenalty,
     /// Least speed along its direction that is asked of each piece, m/s.
     pub(super) floors: Vec<f64>,
     pub(super) weights: Weights,
@@ -167,6 +170,7 @@ impl<'a, F: DistanceField> Problem<'a, F> {
             limits,
             clearance,
             layout,
+            zones: ZonePenalty::new(&[], 0.0),
             floors: vec![0.0; directions.len()],
             directions,
             fixed,
@@ -298,6 +302,7 @@ impl<'a, F: DistanceField> Problem<'a, F> {
             self.local.bend(&basis.rows[0], -share * arc[1] * pull);
             let rest = (piece == 0 && sample == 0) || (piece + 1 == layout.pieces && sample == count);
             cost += self.base_limits(piece, rest, basis, &heading, &arc, &rates, weight * self.weights.motion);
+            cost += self.zone_limit(piece, basis, &arc, &rates, &path, start, weight * self.weights.motion);
             cost += self.joint_limits(basis, &rates, weight * self.weights.motion);
             cost += self.clearance_at([piece, sample, first + sample], basis, &path, start, weight);
         }

@@ -4,6 +4,7 @@ use super::problem::{Derivatives, Problem, STIFFNESS, Weights};
 use super::*;
 use crate::geom::Pose2;
 use crate::math::fd::{numeric_gradient, relative_error};
+use crate::mission::SpeedZone;
 use crate::optimize::penalty::clearance::PointOf;
 use crate::optimize::test_robot::{Boxes, arm, robot};
 use crate::optimize::tests::{Broken, gap, path};
@@ -54,6 +55,8 @@ fn the_gradient_matches_finite_differences() {
         let robot = robot(joints);
         let first = guess(&path, &Limits::new(&robot, 1.0)).expect("it moves");
         let mut problem = problem(&robot, &field, &first);
+        let zone = SpeedZone { polygon: vec![[0.4, -0.3], [1.5, -0.2], [0.9, 1.1]], speed: 0.1 };
+        problem.zones = ZonePenalty::new(&[zone], 0.2);
         let x = disturbed(&first);
         let multipliers: Vec<[f64; 2]> = (0..first.layout.pieces).map(|k| [0.3 * k as f64, -0.2]).collect();
         let mut at = Derivatives::new(first.layout);

@@ -78,7 +78,8 @@ fn key_figures(report: &Report) -> Vec<(String, String)> {
         let heading = certificate
             .end_heading_error_rad
             .map_or("heading left open".into(), |a| format!("and {} of heading", degrees(a)));
-        out.push(key("Off the goal", &mm(error), &heading));
+        let name = if certificate.goal_within_m.is_some() { "From the goal's middle" } else { "Off the goal" };
+        out.push(key(name, &mm(error), &heading));
     }
     out
 }

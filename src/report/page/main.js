@@ -32,13 +32,15 @@ function readWorld(data) {
     boxes: map && readBoxes(map),
     floor: { ...floor, step: span > 60 ? 10 : span > 25 ? 5 : 1 },
     unit: span, low, high, way,
+    zones: data.zones.map((zone) => [...zone.corners, zone.corners[0]]),
     route: data.route.length > 1 ? data.route : null,
     tint: rows && timesAlong(rows, Math.max(0.03, wayLength(rows, reach) / 700), reach)
       .flatMap((t) => { const s = stateAt(rows, t); return footprint(robot, s.pose, s.joints); }),
     ghosts: rows ? ghostTimes(rows, reach).map((t) => { const s = stateAt(rows, t); return { pose: s.pose, frames: shapeFrames(robot, s.pose, s.joints) }; }) : [],
     rings, gap, closest,
     cell: closest && closest.obstacle,
-    labels: labelsOf(places, gap, closest),
+    labels: [...labelsOf(places, gap, closest), ...data.zones.map(({ corners, speed }) => (
+      { at: [...[0, 1].map((a) => corners.reduce((sum, p) => sum + p[a], 0) / corners.length), 0.05], text: `${speed} m/s` }))],
   };
 }
 

@@ -24,7 +24,7 @@ use super::Report;
 use crate::certify::{self, Instant, Trust};
 use crate::command::CommandTable;
 use crate::map::VoxelMap;
-use crate::mission::PoseSpec;
+use crate::mission::{PoseSpec, SpeedZone};
 use crate::robot::{Convex, RobotModel};
 
 use html::{escape, fill, in_script};
@@ -64,6 +64,8 @@ pub struct PageInputs<'a> {
     pub commands: Option<&'a CommandTable>,
     /// Start and goal as the mission asks for them.
     pub ends: [Option<&'a PoseSpec>; 2],
+    /// Where the base is to be slow.
+    pub zones: &'a [SpeedZone],
     /// Places of the base on the search's path, m.
     pub route: &'a [[f64; 2]],
     /// How far the commands can be trusted.
@@ -160,6 +162,7 @@ fn scene(inputs: &PageInputs<'_>, distances: Option<&Distances>) -> (scene::Scen
         closest: inputs.report.certificate.as_ref().and_then(|c| c.closest.clone()),
         places,
         gap,
+        zones: inputs.zones.iter().map(|z| scene::Zone { corners: z.polygon.clone(), speed: z.speed }).collect(),
         route: inputs.route.iter().map(|p| p.map(|v| (v * 1e4).round() / 1e4)).collect(),
     };
     (out, factor.unwrap_or(1))

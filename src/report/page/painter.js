@@ -76,6 +76,7 @@ class Painter {
       tint: world.tint && faces(floorTriangles(world.tint, 0.003)),
       way: world.way && faces(ribbon(world.way, world.unit * 0.0045, 0.006)),
       route: world.route && lines(dashes(world.route, world.unit * 0.012, 0.005)),
+      zones: world.zones.map((zone) => lines(dashes(zone, world.unit * 0.012, 0.004))),
       rings: world.rings.map((ring) => lines(circle(ring.at, ring.radius, 0.008))),
       cell: world.cell && lines(Float32Array.from(frameLines(world.cell.min, world.cell.max))),
       shapes: world.robot.shapes.map((shape) => ({ faces: faces(shapeFaces(shape)), lines: lines(shapeLines(shape)), moved: shape.moved })),
@@ -153,6 +154,7 @@ class Painter {
       this.once(() => this.put(mesh.way, rgba(palette.ahead, opacity), { first: driven }));
       this.once(() => this.put(mesh.way, rgba(palette.driven, opacity), { count: driven }));
     };
+    mesh.zones.forEach((zone) => this.put(zone, rgba(palette.moved)));
     this.put(mesh.route, rgba(palette.route));
     way(1);
 

@@ -47,6 +47,7 @@ class Plan {
       const low = [world.map.origin[0] + world.map.cell * x, world.map.origin[1] + world.map.cell * y];
       fill(rectangle(low, [low[0] + world.map.cell * dx, low[1] + world.map.cell * dy]), palette.obstacle);
     }
+    world.zones.forEach((zone) => stroke(zone, palette.moved, 1.5));
     if (world.way) {
       const k = Math.round(now.share * (world.way.length - 1));
       stroke(world.way.slice(k), palette.ahead, 2);

@@ -129,17 +129,24 @@ fn proven(inputs: &PageInputs<'_>, certificate: &CertificatePart) -> Vec<(String
         (false, _) => "a limit is passed".to_owned(),
     };
     out.push(("Limits".into(), escape(&limits)));
+    if !certificate.speed_zones.is_empty() {
+        let zones = crate::report::summary::zones_text(certificate).join(", ").replace('\u{a0}', " ");
+        out.push((
+            "Speed zones".into(),
+            escape(&format!("greatest speed at any instant in each, of what is allowed: {zones}")),
+        ));
+    }
     if !certificate.vias.is_empty() {
         let times: Vec<String> = certificate.vias.iter().map(|via| format!("{:.1} s", via.time_s)).collect();
         out.push(("Stops".into(), escape(&format!("at rest at each via: at {}", times.join(", ")))));
     }
     if let Some(error) = certificate.end_point_error_m {
         let heading = certificate.end_heading_error_rad.map_or(String::new(), |a| format!(" and {}", degrees(a)));
-        let allowed = format!("{} and {}", mm(END_POINT_TOLERANCE), degrees(END_ANGLE_TOLERANCE));
-        out.push((
-            "End".into(),
-            escape(&format!("at rest within {}{heading} of the goal; {allowed} are allowed", mm(error))),
-        ));
+        let region = certificate.goal_within_m;
+        let allowed = format!("{} and {}", mm(region.unwrap_or(END_POINT_TOLERANCE)), degrees(END_ANGLE_TOLERANCE));
+        let what = if region.is_some() { "the middle of the goal" } else { "the goal" };
+        let text = format!("at rest within {}{heading} of {what}; {allowed} are allowed", mm(error));
+        out.push(("End".into(), escape(&text)));
     }
     if let Some(commands) = &inputs.report.commands {
         let text =

@@ -35,8 +35,19 @@ pub(super) struct Scene {
     pub(super) closest: Option<ClosestPart>,
     pub(super) places: Vec<Place>,
     pub(super) gap: Option<Gap>,
+    /// Where the base is to be slow.
+    pub(super) zones: Vec<Zone>,
     /// The search's path, or the path given.
     pub(super) route: Vec<[f64; 2]>,
+}
+
+/// A speed zone.
+#[derive(Debug, Serialize)]
+pub(super) struct Zone {
+    /// Its corners, m.
+    pub(super) corners: Vec<[f64; 2]>,
+    /// m/s.
+    pub(super) speed: f64,
 }
 
 /// The robot: bodies in order, parents first, and shapes on them.

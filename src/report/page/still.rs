@@ -32,6 +32,7 @@ pub fn svg(inputs: &PageInputs<'_>) -> String {
         }
         lines.push(line + "; every wheel and joint within its limits");
     }
+    place::zones(&mut view, inputs.zones);
     if let Some((table, robot)) = inputs.motion() {
         motion::draw(&mut view, robot, table);
         if let Some(distances) = inputs.distances() {

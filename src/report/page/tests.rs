@@ -128,7 +128,7 @@ impl Case {
         let task = Task {
             start: table.rows[0].pose,
             start_joints: table.rows[0].joint_positions.clone(),
-            goal: Goal { x: last.x, y: last.y, yaw: None, joints: vec![None; 2] },
+            goal: Goal { x: last.x, y: last.y, within: 0.0, yaw: None, joints: vec![None; 2] },
             clearance,
             reverse: false,
         };
@@ -163,6 +163,7 @@ impl Case {
             map: self.map.as_ref(),
             commands: Some(&self.table),
             ends: [None, None],
+            zones: &[],
             route: &[[0.0, 0.0], [1.0, 1.0]],
             trust: self.trust.as_ref(),
         }
@@ -345,8 +346,12 @@ fn a_failed_mission_shows_where_it_got_and_what_was_missing() {
         .number("something_else", 42);
     case.report = Report::new(InputsPart::default());
     case.report.fail(&Diagnostics(vec![fault]));
-    let place =
-        |x: f64| PoseSpec { x: Some(x), y: Some(1.0), yaw: None, joints: BTreeMap::from([("lift".into(), 0.75)]) };
+    let place = |x: f64| PoseSpec {
+        x: Some(x),
+        y: Some(1.0),
+        joints: BTreeMap::from([("lift".into(), 0.75)]),
+        ..Default::default()
+    };
     let ends = [place(0.0), place(4.0)];
     let inputs = PageInputs { commands: None, ends: [Some(&ends[0]), Some(&ends[1])], ..case.inputs() };
     let page = html(&inputs);

@@ -137,6 +137,13 @@ impl TopView {
         self.add(Item::Line(points, paint), paint, name);
     }
 
+    /// An area of the floor, outlined and faintly tinted.
+    pub fn area(&mut self, corners: Vec<[f64; 2]>, colour: usize, name: &'static str) {
+        let colour = COLOURS[colour % COLOURS.len()];
+        let paint = Paint::line(colour, 1.2).tinted(colour, 0.10).dashed("5 3");
+        self.add(Item::Outlines(vec![corners], paint), paint, name);
+    }
+
     /// The robot's outline at a pose with joint values `q`: base and what joints move in two colours.
     pub fn robot(&mut self, robot: &RobotModel, pose: Pose2, q: &[f64]) {
         for Part { outline, fixed } in outline::of_robot(robot, pose, q) {

@@ -22,6 +22,8 @@ fn certificate() -> Certificate {
         tolerance: None,
         own_links: None,
         end_point_error: 4.2e-5,
+        end_point_allowed: END_POINT_TOLERANCE,
+        zones: Vec::new(),
         end_heading_error: Some(1.7e-5),
         vias: Vec::new(),
         limits: vec![

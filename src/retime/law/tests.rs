@@ -15,7 +15,7 @@ fn path(name: &str) -> Trajectory {
 }
 
 fn task(robot: &RobotModel, own_timing: bool) -> Task<'_> {
-    Task { robot, hold: 0.1, own_timing, one_segment: true, leg: 0 }
+    Task { robot, hold: 0.1, own_timing, one_segment: true, leg: 0, zones: Zones::new(&[], robot, 0.1) }
 }
 
 fn course(trajectory: &Trajectory) -> Curved {

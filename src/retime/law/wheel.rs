@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::mission::TimeLaw;
 use crate::retime::convolution::Convolution;
 use crate::retime::course::{Course, Curved};
-use crate::retime::limits::{Scope, limits};
+use crate::retime::limits::Scope;
 use crate::retime::metric::Metric;
 use crate::retime::peaks::slow_down;
 use crate::retime::timed_leg::{Clock, TimedLeg};
@@ -56,7 +56,7 @@ pub(super) fn time(curved: &Curved, task: Task<'_>) -> TimedLeg {
         compensation: 0.0,
     };
     let peaks = peaks_of(&leg, task, Scope::Actuators);
-    let stretch = slow_down(&peaks, &limits(task.robot, Scope::Actuators), task.hold);
+    let stretch = slow_down(&peaks, &task.limits(Scope::Actuators), task.hold);
     with_peak_speed(TimedLeg { stretch, ..leg }, &peaks, task)
 }
 
