@@ -22,6 +22,7 @@ mod player;
 pub mod realtime;
 pub mod sink;
 pub mod sinks;
+pub mod tracking;
 
 pub use clock::{Clock, MonotonicClock, SimulatedClock};
 pub use jitter::JitterReport;
