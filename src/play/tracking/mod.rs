@@ -39,6 +39,8 @@ const JOINT_GAIN: f64 = 4.0;
 /// Shares of the actuators' limits (speed, acceleration, jerk) that the reference leaves to corrections: where the file needs more, its time goes
 /// slower.
 const RESERVE: [f64; 3] = [0.05, 0.2, 0.4];
+/// What joints are off at the end that is not taken away any more, rad or m.
+const JOINT_AT_REST: f64 = 1e-5;
 /// Speeds below this are none, rad/s or m/s.
 const NONE: f64 = 1e-9;
 /// Coordinates beyond this are no pose, m and rad.
@@ -420,10 +422,15 @@ impl<'a> Tracker<'a> {
         for joint in 0..next.joints.len() {
             let k = 2 + joint;
             let planned = |at: f64| self.motion.joint(joint, at / hold);
-            let (here, there) = (planned(next.path_time), planned(next.path_time + next.pace * time));
             let value = next.joints[joint];
+            // Behind the end of the path nothing moves by itself.
+            let ahead = if next.path_time >= self.duration() { 0.0 } else { next.pace * time };
+            let (here, there) = (planned(next.path_time), planned(next.path_time + ahead));
+            let here = if ahead == 0.0 && (here - value).abs() < JOINT_AT_REST { value } else { here };
+            let there = if ahead == 0.0 { here } else { there };
             let [low, high] = self.ranges[joint];
-            let rate = (planned(next.path_time + 2.0 * next.pace * time) - 2.0 * there + here) / (time * time);
+            let rate = (planned(next.path_time + 2.0 * ahead) - 2.0 * planned(next.path_time + ahead) + planned(next.path_time))
+                / (time * time);
             let wanted = ((there - here) / time + JOINT_GAIN * (here - value))
                 .clamp((low - value).min(0.0) / time, (high - value).max(0.0) / time);
             let [low, high] = self.bounds[k].admissible(next.held[k], time);

@@ -31,6 +31,8 @@ const TURN_SLIP: f64 = 0.004;
 const CREEP: (f64, f64) = (1e-4, 2e-4);
 /// A pose is far off beyond so many standard deviations, and these distances besides: m, rad.
 const FAR: (f64, f64, f64) = (5.0, 0.1, 0.15);
+/// Squared distance of a pose in standard deviations beyond which the model did not see it coming (chi-square of three degrees: one in a thousand).
+const SURPRISE: f64 = 16.3;
 /// Far poses in a row that are believed.
 const BELIEVED: usize = 5;
 /// Steps in which time is driven at most, s: bounds what is lost by linearizing.
@@ -176,7 +178,10 @@ impl Observer {
         // Poses by states: of the pose the identity (a late arc's own turn is left out), of the latency the way back.
         let mut by_state = SMatrix::<f64, 3, 7>::identity();
         by_state.set_column(6, &by_latency);
-        let spread = by_state * self.covariance * by_state.transpose() + Matrix3::from_diagonal(&noise);
+        let spread_of = |covariance: &Covariance| {
+            by_state * covariance * by_state.transpose() + Matrix3::from_diagonal(&noise)
+        };
+        let mut spread = spread_of(&self.covariance);
         let (sigmas, metres, radians) = FAR;
         let is_far = off.xy().norm() > metres + sigmas * (spread[(0, 0)] + spread[(1, 1)]).sqrt()
             || off.z.abs() > radians + sigmas * spread[(2, 2)].sqrt();
@@ -191,7 +196,13 @@ impl Observer {
             known.into_iter().enumerate().for_each(|(k, value)| self.state[3 + k] = value);
             return true;
         }
-        let Some(inverse) = spread.try_inverse() else { return false };
+        let Some(mut inverse) = spread.try_inverse() else { return false };
+        if (off.transpose() * inverse * off)[0] > SURPRISE {
+            // A push, a slip: the pose must take it, not what is believed of the wheels.
+            (0..3).for_each(|k| self.covariance[(k, k)] += off[k] * off[k]);
+            spread = spread_of(&self.covariance);
+            inverse = spread.try_inverse().unwrap_or(inverse);
+        }
         let gain = self.covariance * by_state.transpose() * inverse;
         self.state += gain * off;
         // Joseph's form: stays symmetric and positive.
