@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Top to bottom, as in `src/lib.rs`. A module may name itself and those before it.
-const ORDER: [&str; 21] = [
+const ORDER: [&str; 22] = [
     "math",
     "geom",
     "diag", // for everyone
@@ -20,7 +20,8 @@ const ORDER: [&str; 21] = [
     "certify",
     "report",
     "emit",
-    "play", // stages
+    "play",
+    "calibrate", // stages
     "pipeline",
     "inputs",
     "eval",
