@@ -21,7 +21,6 @@ fn main() {
         for (name, fault) in disturbances() {
             let free = open(&prepared, fault);
             let runs: Vec<_> = (0..SEEDS).map(|seed| closed(&prepared, fault, Options::default(), 0.05, seed)).collect();
-            if std::env::var("DBG").is_ok() { for (t, c) in &runs[0].commands { println!("D {t:.2} s {:.3} pace {:.3} wl {:.3} wr {:.3} e {:.4} {:.4} {:.4} {:?} {:?}", c.path_time, c.pace, c.row.wheel_left, c.row.wheel_right, c.error.along, c.error.across, c.error.heading, c.phase, c.shares); } }
             let worst = |of: &dyn Fn(&simulated::Run) -> f64| runs.iter().map(of).fold(0.0, f64::max);
             println!(
                 "  {name:<28} {:7.1} {:6.2} {:7.1} | {:5.1} {:5.2} {:6.1}  tube {:4.2}  {:5.1} s for {:5.1} s  {:?}",
