@@ -20,7 +20,8 @@ fn main() {
         println!("{path}");
         for (name, fault) in disturbances() {
             let free = open(&prepared, fault);
-            let runs: Vec<_> = (0..SEEDS).map(|seed| closed(&prepared, fault, Options::default(), 0.05, seed)).collect();
+            let runs: Vec<_> =
+                (0..SEEDS).map(|seed| closed(&prepared, fault, Options::default(), 0.05, seed)).collect();
             let worst = |of: &dyn Fn(&simulated::Run) -> f64| runs.iter().map(of).fold(0.0, f64::max);
             println!(
                 "  {name:<28} {:7.1} {:6.2} {:7.1} | {:5.1} {:5.2} {:6.1}  tube {:4.2}  {:5.1} s for {:5.1} s  {:?}",
@@ -33,7 +34,10 @@ fn main() {
                 worst(&|r| r.filled),
                 worst(&|r| r.time),
                 prepared.motion.table().duration(),
-                runs.iter().map(|r| r.phase).find(|p| *p != trajc::play::tracking::Phase::Done).unwrap_or(runs[0].phase),
+                runs.iter()
+                    .map(|r| r.phase)
+                    .find(|p| *p != trajc::play::tracking::Phase::Done)
+                    .unwrap_or(runs[0].phase),
             );
         }
     }

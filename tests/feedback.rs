@@ -39,7 +39,10 @@ fn ends_where_the_file_ends(name: &str) {
             let run = closed(&prepared, fault, Options::default(), 0.05, seed);
             assert_eq!(run.phase, Phase::Done, "{name}, {disturbance}");
             let (metres, radians) = run.end;
-            assert!(metres <= 0.010 && radians <= 1f64.to_radians(), "{name}, {disturbance}: {metres} m, {radians} rad");
+            assert!(
+                metres <= 0.010 && radians <= 1f64.to_radians(),
+                "{name}, {disturbance}: {metres} m, {radians} rad"
+            );
             assert!(run.filled < 1.0, "{name}, {disturbance}: the tube is left, {}", run.filled);
         }
     }
@@ -69,7 +72,11 @@ fn a_fast_base_over_thirty_metres() {
 }
 
 /// A base behind a running `trajc play --to stdio`: its answers, and how far from the end it is.
-fn over_stdio(sandbox: &Sandbox, fault: Fault, spoil: impl Fn(usize, String) -> String) -> (Vec<serde_json::Value>, f64, i32) {
+fn over_stdio(
+    sandbox: &Sandbox,
+    fault: Fault,
+    spoil: impl Fn(usize, String) -> String,
+) -> (Vec<serde_json::Value>, f64, i32) {
     let path = sandbox.path("out/a/commands.csv");
     let prepared = prepare(&path);
     let mut child = Command::new(env!("CARGO_BIN_EXE_trajc"))
@@ -80,7 +87,8 @@ fn over_stdio(sandbox: &Sandbox, fault: Fault, spoil: impl Fn(usize, String) -> 
         .spawn()
         .expect("the program starts");
     let (mut input, output) = (child.stdin.take().expect("piped"), child.stdout.take().expect("piped"));
-    let (mut lines, mut base, mut noise) = (BufReader::new(output).lines(), Base::new(&prepared.motion, fault), Noise(1));
+    let (mut lines, mut base, mut noise) =
+        (BufReader::new(output).lines(), Base::new(&prepared.motion, fault), Noise(1));
     let mut answers: Vec<serde_json::Value> = Vec::new();
     for k in 0..2000 {
         let time = 0.05 * k as f64;
@@ -90,7 +98,8 @@ fn over_stdio(sandbox: &Sandbox, fault: Fault, spoil: impl Fn(usize, String) -> 
         if writeln!(input, "{}", spoil(k, line)).is_err() {
             break;
         }
-        let answer: serde_json::Value = serde_json::from_str(&lines.next().expect("an answer").expect("text")).expect("JSON");
+        let answer: serde_json::Value =
+            serde_json::from_str(&lines.next().expect("an answer").expect("text")).expect("JSON");
         let wheel = |side: &str| answer[format!("wheel_{side}_rad_s")].as_f64().expect("a number");
         base.command([wheel("left"), wheel("right")]);
         let over = ["done", "stopped"].contains(&answer["state"].as_str().expect("a state"));
@@ -126,7 +135,9 @@ fn over_stdio_bad_poses_are_refused_and_missing_ones_stop_the_robot() {
         _ => line,
     };
     let (answers, off, code) = over_stdio(&sandbox, Fault::default(), spoil);
-    assert!(answers[40]["refused"].is_string() && answers[41]["refused"].is_string() && answers[42]["refused"].is_null());
+    assert!(
+        answers[40]["refused"].is_string() && answers[41]["refused"].is_string() && answers[42]["refused"].is_null()
+    );
     assert_eq!(answers[41]["wheel_left_rad_s"], answers[39]["wheel_left_rad_s"], "the last command goes on");
     assert!(code == 0 && off < 0.010, "{off}");
     // From the hundredth on every pose is spoilt until a second has passed.

@@ -52,7 +52,8 @@ pub enum LogError {
 /// A missing column, cells that are no numbers, time that goes back.
 pub fn read_csv(text: &str) -> Result<Log, LogError> {
     let syntax = |error: ::csv::Error| LogError::Syntax(error.to_string());
-    let mut reader = ::csv::ReaderBuilder::new().comment(Some(b'#')).trim(::csv::Trim::All).from_reader(text.as_bytes());
+    let mut reader =
+        ::csv::ReaderBuilder::new().comment(Some(b'#')).trim(::csv::Trim::All).from_reader(text.as_bytes());
     let heads = reader.headers().map_err(syntax)?.clone();
     let mut places = [0; COLUMNS.len()];
     for (place, name) in places.iter_mut().zip(COLUMNS) {

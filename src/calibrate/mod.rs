@@ -19,7 +19,7 @@ pub use log::{Log, LogError, read_csv};
 pub use rewrite::{RewriteError, rewrite};
 
 /// Between the poses of a pair, s.
-const APART: f64 = 1.0;
+const APART: f64 = 3.0;
 /// Huber's constant: whitened pairs longer than this count less. Of a chi of three degrees, 2.5 is exceeded by one in ten.
 const HUBER: f64 = 2.5;
 /// Most Gauss-Newton steps, and the relative step at which they end.
@@ -113,7 +113,9 @@ impl Fit {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CalibrateError {
     /// Too short.
-    #[error("the log has {found} pairs of poses {APART} s apart with wheel angles around them, at least {FEWEST} are needed")]
+    #[error(
+        "the log has {found} pairs of poses {APART} s apart with wheel angles around them, at least {FEWEST} are needed"
+    )]
     Short {
         /// Pairs.
         found: usize,
@@ -133,7 +135,9 @@ pub enum CalibrateError {
         share: f64,
     },
     /// It does not come to an end, or far from where it began.
-    #[error("no radii and track explain this log: are wheel angles and poses of the same clock, in radians and metres?")]
+    #[error(
+        "no radii and track explain this log: are wheel angles and poses of the same clock, in radians and metres?"
+    )]
     Unexplained,
 }
 

@@ -122,7 +122,8 @@ mod tests {
     fn what_is_written_is_read_back_and_written_again_the_same() {
         let text = written("urdf: a.urdf\ndrive: {left: l, right: r}\n");
         assert_eq!(written(&text), text);
-        let drive: String = text.lines().filter(|line| !line.starts_with("tolerance")).map(|l| format!("{l}\n")).collect();
+        let drive: String =
+            text.lines().filter(|line| !line.starts_with("tolerance")).map(|l| format!("{l}\n")).collect();
         let spec = spec::parse("robot.yaml", &drive).expect("a robot.yaml");
         assert_eq!(spec.wheel_radius.map(|w| w.value), Some(0.0802));
         assert_eq!(spec.track_width.map(|w| w.value), Some(0.3215));

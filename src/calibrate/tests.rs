@@ -42,7 +42,8 @@ fn chi_square(fit: &Fit) -> f64 {
 
 #[test]
 fn without_noise_radii_and_track_are_found_to_rounding() {
-    let fit = fit(&log(&rich(), PoseNoise { metres: 0.0, radians: 0.0 }, 0.0, 1), GUESS, PoseNoise::default()).expect("a fit");
+    let fit = fit(&log(&rich(), PoseNoise { metres: 0.0, radians: 0.0 }, 0.0, 1), GUESS, PoseNoise::default())
+        .expect("a fit");
     for k in 0..3 {
         assert!((fit.geometry[k] - TRUE[k]).abs() < 1e-9, "{:?}", fit.geometry);
     }
@@ -54,7 +55,12 @@ fn errors_are_as_the_covariance_says() {
     for outliers in [0.0, 0.03] {
         let count = 60;
         let mean = (0..count)
-            .map(|seed| chi_square(&fit(&log(&rich(), PoseNoise::default(), outliers, seed), GUESS, PoseNoise::default()).expect("a fit")))
+            .map(|seed| {
+                chi_square(
+                    &fit(&log(&rich(), PoseNoise::default(), outliers, seed), GUESS, PoseNoise::default())
+                        .expect("a fit"),
+                )
+            })
             .sum::<f64>()
             / count as f64;
         // Chi-square of three degrees: mean 3, variance 6; of the mean of 60 a deviation of 0.32. A covariance that is estimated itself,
@@ -66,7 +72,8 @@ fn errors_are_as_the_covariance_says() {
 #[test]
 fn a_wrong_guess_of_the_noise_does_not_spoil_the_covariance() {
     let wrong = PoseNoise { metres: 0.02, radians: 2f64.to_radians() };
-    let mean = (0..30).map(|s| chi_square(&fit(&log(&rich(), PoseNoise::default(), 0.0, s), GUESS, wrong).expect("a fit")));
+    let mean =
+        (0..30).map(|s| chi_square(&fit(&log(&rich(), PoseNoise::default(), 0.0, s), GUESS, wrong).expect("a fit")));
     let mean = mean.sum::<f64>() / 30.0;
     assert!((1.5..5.0).contains(&mean), "{mean}");
 }
@@ -106,4 +113,26 @@ fn the_remaining_tolerance_is_three_deviations_and_the_difference_found() {
     let difference = (TRUE[1] - TRUE[0]) / (0.5 * (TRUE[0] + TRUE[1]));
     assert!(remaining.wheel_difference > difference.abs() && remaining.wheel_difference < 3.0 * difference.abs());
     assert!(remaining.track < 0.01 && remaining.wheel_radius < 0.005, "{remaining:?}");
+}
+
+#[test]
+fn scipy_finds_the_same() {
+    let text = include_str!("../../tests/vectors/calibrate.json");
+    let value: serde_json::Value = serde_json::from_str(text).expect("JSON");
+    let numbers = |value: &serde_json::Value| -> Vec<f64> {
+        value.as_array().expect("a list").iter().map(|v| v.as_f64().expect("a number")).collect()
+    };
+    let mut log = Log::default();
+    for row in value["rows"].as_array().expect("rows") {
+        let row = numbers(row);
+        log.wheels.push((row[0], [row[1], row[2]]));
+        log.poses.push((row[0], Pose2::new(row[3], row[4], row[5])));
+    }
+    let fit = fit(&log, GUESS, PoseNoise::default()).expect("a fit");
+    assert_eq!(fit.pairs as u64, value["pairs"].as_u64().expect("a number"));
+    assert!(fit.outliers > 0);
+    for (ours, theirs) in fit.geometry.iter().zip(numbers(&value["found"])) {
+        // Both stop where steps are rounding.
+        assert!((ours / theirs - 1.0).abs() < 1e-7, "{ours} {theirs}");
+    }
 }

@@ -84,7 +84,8 @@ pub fn calibrate(args: &CalibrateArgs, terminal: &mut Terminal) -> Result<u8, Di
         terminal.remark(&format!("{}: written\n", args.robot.display()));
     } else if !args.json {
         let old: Vec<&str> = yaml.text.lines().collect();
-        let changed: String = new.lines().filter(|line| !old.contains(line)).map(|line| format!("  {line}\n")).collect();
+        let changed: String =
+            new.lines().filter(|line| !old.contains(line)).map(|line| format!("  {line}\n")).collect();
         terminal.print(&format!("would write into {}:\n{changed}", args.robot.display()));
     }
     Ok(0)

@@ -9,7 +9,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use super::terminal::Terminal;
-use feedback::Following;
 use crate::command::CommandTable;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::inputs::commands::{self, LoadedCommands, Places};
@@ -17,6 +16,7 @@ use crate::play::address::Address;
 use crate::play::pace::{self, Limits};
 use crate::play::tracking::Phase;
 use crate::play::{self, Ending, MonotonicClock, Motion, Outcome, Play, Reason, SinkError, motion, realtime};
+use feedback::Following;
 
 /// Signals that come this close to each other are one.
 const ONE_REQUEST: Duration = Duration::from_millis(100);

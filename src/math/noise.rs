@@ -36,5 +36,7 @@ fn mean_variance_and_kurtosis_are_those_of_normal_numbers() {
     let moment = |power: i32| all.iter().map(|v| v.powi(power)).sum::<f64>() / all.len() as f64;
     // Four standard errors: roots of 1, 2 and 96 over the count.
     let error = |variance: f64| 4.0 * (variance / all.len() as f64).sqrt();
-    assert!(moment(1).abs() < error(1.0) && (moment(2) - 1.0).abs() < error(2.0) && (moment(4) - 3.0).abs() < error(96.0));
+    assert!(
+        moment(1).abs() < error(1.0) && (moment(2) - 1.0).abs() < error(2.0) && (moment(4) - 3.0).abs() < error(96.0)
+    );
 }

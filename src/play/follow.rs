@@ -127,11 +127,7 @@ pub fn follow(
 }
 
 /// A receiver that is gone for good ends it; one that may come back gets the stop.
-fn lost(
-    result: Result<(), SinkError>,
-    state: &mut super::tracking::State,
-    tracker: &Tracker<'_>,
-) -> Option<SinkError> {
+fn lost(result: Result<(), SinkError>, state: &mut super::tracking::State, tracker: &Tracker<'_>) -> Option<SinkError> {
     match result {
         Ok(()) => None,
         Err(SinkError::Lost(_)) => {

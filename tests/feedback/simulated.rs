@@ -57,7 +57,8 @@ pub struct Prepared {
 
 /// Reads a compiled file; the room is the clearance that is proven.
 pub fn prepare(path: &Path) -> Prepared {
-    let loaded = commands::load(path, Places::default()).unwrap_or_else(|f| panic!("{}", trajc::diag::render(&f, false)));
+    let loaded =
+        commands::load(path, Places::default()).unwrap_or_else(|f| panic!("{}", trajc::diag::render(&f, false)));
     let clearance = loaded.certify().expect("a certificate").clearance_proven.unwrap_or(0.1);
     let reverse = loaded.inputs.mission.reverse;
     let (robot, motion) = (loaded.world.robot, Motion::new(loaded.file.table));

@@ -29,10 +29,10 @@ impl Bounds {
     /// The speeds that may be held next, `time` seconds after the last command.
     pub fn admissible(&self, held: Held, time: f64) -> [f64; 2] {
         let step = self.jerk * time;
-        let high = self.acceleration.min(held.acceleration + step).min(towards(self.speed - held.speed, self.jerk, time));
-        let low = (-self.acceleration)
-            .max(held.acceleration - step)
-            .max(-towards(self.speed + held.speed, self.jerk, time));
+        let high =
+            self.acceleration.min(held.acceleration + step).min(towards(self.speed - held.speed, self.jerk, time));
+        let low =
+            (-self.acceleration).max(held.acceleration - step).max(-towards(self.speed + held.speed, self.jerk, time));
         // Empty by rounding only.
         let (low, high) = if low <= high { (low, high) } else { (0.5 * (low + high), 0.5 * (low + high)) };
         [low, high].map(|a| (held.speed + a * time).clamp(-self.speed, self.speed))

@@ -208,9 +208,8 @@ impl<'a> Tracker<'a> {
         let rows = table.rows.len() as isize;
         let fastest = bounds.iter().enumerate().map(|(actuator, limits)| {
             let peaks = differences((0..rows).map(|k| motion.speed(actuator, k)), hold);
-            let pace = |order: usize| {
-                ((1.0 - RESERVE[order]) * limits[order] / peaks[order]).powf(1.0 / (order + 1) as f64)
-            };
+            let pace =
+                |order: usize| ((1.0 - RESERVE[order]) * limits[order] / peaks[order]).powf(1.0 / (order + 1) as f64);
             pace(0).min(pace(1)).min(pace(2))
         });
         let fastest = fastest.fold(1.0, f64::min);
@@ -379,10 +378,8 @@ impl<'a> Tracker<'a> {
             (self.motion.travel(wheel, to / hold) - self.motion.travel(wheel, next.path_time / hold)) * hold / time
         };
         let rims = [mean(0), mean(1)].map(|rate| self.drive.wheel_radius * rate);
-        let reference = Twist {
-            speed: 0.5 * (rims[0] + rims[1]),
-            turn_rate: (rims[1] - rims[0]) / self.drive.track_width,
-        };
+        let reference =
+            Twist { speed: 0.5 * (rims[0] + rims[1]), turn_rate: (rims[1] - rims[0]) / self.drive.track_width };
         let planned = self.rates(reference, shares);
         let rate = [0, 1].map(|wheel| (planned[wheel] - next.planned[wheel]) / time);
         next.planned = planned;
@@ -429,7 +426,8 @@ impl<'a> Tracker<'a> {
             let here = if ahead == 0.0 && (here - value).abs() < JOINT_AT_REST { value } else { here };
             let there = if ahead == 0.0 { here } else { there };
             let [low, high] = self.ranges[joint];
-            let rate = (planned(next.path_time + 2.0 * ahead) - 2.0 * planned(next.path_time + ahead) + planned(next.path_time))
+            let rate = (planned(next.path_time + 2.0 * ahead) - 2.0 * planned(next.path_time + ahead)
+                + planned(next.path_time))
                 / (time * time);
             let wanted = ((there - here) / time + JOINT_GAIN * (here - value))
                 .clamp((low - value).min(0.0) / time, (high - value).max(0.0) / time);

@@ -178,9 +178,8 @@ impl Observer {
         // Poses by states: of the pose the identity (a late arc's own turn is left out), of the latency the way back.
         let mut by_state = SMatrix::<f64, 3, 7>::identity();
         by_state.set_column(6, &by_latency);
-        let spread_of = |covariance: &Covariance| {
-            by_state * covariance * by_state.transpose() + Matrix3::from_diagonal(&noise)
-        };
+        let spread_of =
+            |covariance: &Covariance| by_state * covariance * by_state.transpose() + Matrix3::from_diagonal(&noise);
         let mut spread = spread_of(&self.covariance);
         let (sigmas, metres, radians) = FAR;
         let is_far = off.xy().norm() > metres + sigmas * (spread[(0, 0)] + spread[(1, 1)]).sqrt()
@@ -294,7 +293,11 @@ mod tests {
             let pose = truth(shares, time);
             observer = observer.driven(&DRIVE, &history(), time);
             let [a, b, c] = rng.normals();
-            observer.see(&DRIVE, &history(), Pose2::new(pose.x + 0.005 * a, pose.y + 0.005 * b, pose.yaw + DRIVE.turn_noise * c));
+            observer.see(
+                &DRIVE,
+                &history(),
+                Pose2::new(pose.x + 0.005 * a, pose.y + 0.005 * b, pose.yaw + DRIVE.turn_noise * c),
+            );
         }
         let found = observer.shares();
         for (k, (found, meant)) in

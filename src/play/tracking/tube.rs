@@ -51,11 +51,7 @@ impl Tube {
         };
         let share = (time - before.time) / (after.time - before.time);
         let between = |a: f64, b: f64| a + share * (b - a);
-        Room {
-            time,
-            metres: between(before.metres, after.metres),
-            radians: between(before.radians, after.radians),
-        }
+        Room { time, metres: between(before.metres, after.metres), radians: between(before.radians, after.radians) }
     }
 
     /// How far the robot is outside: the largest of metres over room and radians over room, 1 at the border. Of a robot that lags only
@@ -83,10 +79,7 @@ mod tests {
 
     #[test]
     fn room_is_linear_between_its_knots_and_constant_beyond() {
-        let knots = vec![
-            Room { time: 1.0, metres: 0.1, radians: 0.2 },
-            Room { time: 3.0, metres: 0.3, radians: 0.1 },
-        ];
+        let knots = vec![Room { time: 1.0, metres: 0.1, radians: 0.2 }, Room { time: 3.0, metres: 0.3, radians: 0.1 }];
         let tube = Tube::new(knots, 0.4).expect("knots");
         let at = |time| (tube.room(time).metres, tube.room(time).radians);
         assert_eq!((at(0.0), at(1.0), at(9.0)), ((0.1, 0.2), (0.1, 0.2), (0.3, 0.1)));
