@@ -29,11 +29,12 @@ pub fn rewrite(name: &str, text: &str, fit: &Fit) -> Result<String, RewriteError
         format!("{value:.places$}")
     };
     let values = [
-        ("drive", "wheel_radius_m", length(fit.radius(), radius)),
+        // New keys go before those that are there: the last one comes first.
         ("drive", "track_width_m", length(fit.geometry[2], track)),
-        ("tolerance", "wheel_radius", percent(remaining.wheel_radius)),
-        ("tolerance", "wheel_difference", percent(remaining.wheel_difference)),
+        ("drive", "wheel_radius_m", length(fit.radius(), radius)),
         ("tolerance", "track", percent(remaining.track)),
+        ("tolerance", "wheel_difference", percent(remaining.wheel_difference)),
+        ("tolerance", "wheel_radius", percent(remaining.wheel_radius)),
     ];
     values.into_iter().try_fold(text.to_owned(), |text, (table, key, value)| set(name, &text, table, key, &value))
 }
@@ -103,9 +104,9 @@ mod tests {
     #[test]
     fn values_are_replaced_or_added_and_nothing_else_changes() {
         let text = "# mine\nurdf: a.urdf   # as built\ndrive: {left: l, wheel_radius_m: 0.08,  right: r} # wheels\nlimits:\n  wheel: {speed_mps: 1}\n";
-        let expected = "# mine\nurdf: a.urdf   # as built\ndrive: {track_width_m: 0.32150, left: l, wheel_radius_m: 0.080200,  right: r} # wheels\n\
+        let expected = "# mine\nurdf: a.urdf   # as built\ndrive: {track_width_m: 0.32150, left: l, wheel_radius_m: 0.0802000,  right: r} # wheels\n\
                         limits:\n  wheel: {speed_mps: 1}\n\
-                        tolerance: {track: 0.19%, wheel_difference: 0.31%, wheel_radius: 0.027%}\n";
+                        tolerance: {wheel_radius: 0.027%, wheel_difference: 0.31%, track: 0.19%}\n";
         assert_eq!(written(text), expected);
     }
 
@@ -113,9 +114,9 @@ mod tests {
     fn blocks_and_files_without_the_tables_are_written_too() {
         let block = "drive:\n  # found\n  left: l\n  right: r\nurdf: a.urdf";
         let text = written(block);
-        assert!(text.starts_with("drive:\n  # found\n  track_width_m: 0.32150\n  wheel_radius_m: 0.080200\n  left: l\n  right: r\nurdf: a.urdf\n"), "{text}");
+        assert!(text.starts_with("drive:\n  # found\n  wheel_radius_m: 0.0802000\n  track_width_m: 0.32150\n  left: l\n  right: r\nurdf: a.urdf\n"), "{text}");
         let text = written("urdf: a.urdf\n");
-        assert!(text.contains("drive: {track_width_m: 0.32150, wheel_radius_m: 0.080200}\n"), "{text}");
+        assert!(text.contains("drive: {wheel_radius_m: 0.0802000, track_width_m: 0.32150}\n"), "{text}");
     }
 
     #[test]
