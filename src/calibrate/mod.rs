@@ -278,7 +278,7 @@ pub fn fit(log: &Log, guess: Geometry, noise: PoseNoise) -> Result<Fit, Calibrat
     let [radius, difference, track] = fit.deviations();
     let shares = [("the wheels' radius", radius / fit.radius()), ("the wheels' difference", difference)];
     let track = ("the track", track / fit.geometry[2]);
-    match shares.into_iter().chain([track]).find(|(_, share)| !(*share <= UNKNOWN)) {
+    match shares.into_iter().chain([track]).find(|(_, share)| share.is_nan() || *share > UNKNOWN) {
         Some((what, share)) => Err(CalibrateError::Undetermined { what, share }),
         None => Ok(fit),
     }

@@ -295,10 +295,11 @@ impl<'a> Tracker<'a> {
             Some(estimate) => (law::error(reference, estimate.pose()), estimate.shares()),
             None => Default::default(),
         };
-        if let (Some(estimate), true) = (&estimate, next.moves())
-            && !(self.tube.filled(self.motion, next.path_time, estimate.pose()) <= 1.0)
-        {
-            next.give_up(Why::Left(next.path_time));
+        if let (Some(estimate), true) = (&estimate, next.moves()) {
+            let filled = self.tube.filled(self.motion, next.path_time, estimate.pose());
+            if filled.is_nan() || filled > 1.0 {
+                next.give_up(Why::Left(next.path_time));
+            }
         }
         self.set_pace(&mut next, error, seen, time);
         let wheels = self.wheels(&mut next, error, shares, time);

@@ -146,8 +146,8 @@ impl Observer {
         let mut jacobian = Covariance::identity();
         jacobian[(0, 2)] = -dy;
         jacobian[(1, 2)] = dx;
-        for side in 0..2 {
-            let rim = drive.wheel_radius * wheels[side];
+        for (side, rate) in wheels.into_iter().enumerate() {
+            let rim = drive.wheel_radius * rate;
             let sign = if side == 0 { -1.0 } else { 1.0 };
             let column = by_speed * (0.5 * rim) + by_rate * (sign * rim / track);
             jacobian.fixed_view_mut::<3, 1>(0, 3 + side).copy_from(&column);
