@@ -19,6 +19,7 @@
 //! | [`report`] | [`report::Report`] | the nouns above |
 //! | [`emit`] | bytes | `CommandTable`, `Report` |
 //! | [`play`] | commands in real time | `CommandTable`, `RobotModel` |
+//! | [`calibrate`] | wheel radii and track, robot.yaml text | a log, robot.yaml text |
 //!
 //! Above all stages are [`memory`], [`math`], [`geom`] and [`diag`]; below them [`pipeline`], [`inputs`] (reads missions and command files with
 //! all that they name), [`eval`] (suites of scenes) and [`cli`]. Only `inputs` and `cli` open files: stages take text and bytes, so
@@ -109,6 +110,7 @@
 //! long it is held. *replay*: what a robot does that follows the rows exactly. *slab*: the heights between which a map's points
 //! are obstacles. *unknown*: space that the map's maker never saw.
 
+pub mod calibrate;
 pub mod certify;
 pub mod cli;
 pub mod command;

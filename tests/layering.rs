@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Top to bottom, as in `src/lib.rs`. A module may name itself and those before it.
-const ORDER: [&str; 22] = [
+const ORDER: [&str; 23] = [
     "memory",
     "math",
     "geom",
@@ -21,7 +21,8 @@ const ORDER: [&str; 22] = [
     "certify",
     "report",
     "emit",
-    "play", // stages
+    "play",
+    "calibrate", // stages
     "pipeline",
     "inputs",
     "eval",

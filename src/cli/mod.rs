@@ -2,6 +2,7 @@
 //! input or usage.
 
 pub mod build;
+pub mod calibrate;
 pub mod check;
 pub mod compile;
 pub mod completions;
@@ -55,6 +56,7 @@ enum Command {
     Check(check::CheckArgs),
     PathError(path_error::PathErrorArgs),
     Play(play::PlayArgs),
+    Calibrate(calibrate::CalibrateArgs),
     Inspect(inspect::InspectArgs),
     Robot(robot::RobotArgs),
     Eval(eval::EvalArgs),
@@ -89,6 +91,7 @@ pub fn main() -> u8 {
         Command::Check(args) => check::check(args, &mut terminal),
         Command::PathError(args) => path_error::path_error(args, &mut terminal),
         Command::Play(args) => play::play(args, &mut terminal),
+        Command::Calibrate(args) => calibrate::calibrate(args, &mut terminal),
         Command::Inspect(args) => inspect::inspect(args, &mut terminal),
         Command::Robot(args) => robot::robot(args, &mut terminal),
         Command::Eval(args) => eval::eval(args, &mut terminal),

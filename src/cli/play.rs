@@ -1,5 +1,6 @@
 //! `trajc play COMMANDS --to SINK`.
 
+mod feedback;
 mod sinks;
 
 use std::path::PathBuf;
@@ -13,7 +14,9 @@ use crate::diag::{Diagnostic, Diagnostics};
 use crate::inputs::commands::{self, LoadedCommands, Places};
 use crate::play::address::Address;
 use crate::play::pace::{self, Limits};
+use crate::play::tracking::Phase;
 use crate::play::{self, Ending, MonotonicClock, Motion, Outcome, Play, Reason, SinkError, motion, realtime};
+use feedback::Following;
 
 /// Signals that come this close to each other are one.
 const ONE_REQUEST: Duration = Duration::from_millis(100);
@@ -25,13 +28,17 @@ const ONE_REQUEST: Duration = Duration::from_millis(100);
 /// planned path, within the limits of wheels and joints; a second Ctrl-C to a zero command at once. How late rows were is printed at
 /// the end.
 ///
+/// With `--feedback` the robot is seen: a tracking law keeps it on the path within all limits, time is held back where it lags, and it
+/// stops when it leaves the room around its path or poses stop coming. `--to stdio` does the same without a clock: a pose a line in, a
+/// command a line out, so that a simulator can close the loop.
+///
 /// Exit 0: all rows played. 1: stopped before the end, or not certified. 2: bad input or usage, or nobody to play to; nothing was
 /// sent.
 #[derive(Debug, clap::Args)]
 pub struct PlayArgs {
     /// Command file to play (.csv or .mcap).
     commands: PathBuf,
-    /// Where to: stdout, udp://HOST:PORT, can:IFACE, can:udp://HOST:PORT[?local=PORT], ros2, zenoh[:ENDPOINT], foxglove[://HOST:PORT].
+    /// Where to: stdout, stdio, udp://HOST:PORT, can:IFACE, can:udp://HOST:PORT[?local=PORT], ros2, zenoh[:ENDPOINT], foxglove[://HOST:PORT].
     #[arg(long, value_name = "SINK")]
     to: Address,
     /// A second sink, for the joints of a robot whose base is driven by CAN.
@@ -54,6 +61,8 @@ pub struct PlayArgs {
     force: bool,
     #[command(flatten)]
     sinks: sinks::SinkArgs,
+    #[command(flatten)]
+    feedback: feedback::FeedbackArgs,
     /// Print how it went as JSON on stdout.
     #[arg(long)]
     json: bool,
@@ -79,13 +88,13 @@ fn start(text: &str) -> Result<f64, String> {
 /// # Errors
 /// Bad input, nobody to play to, or a file that is not certified. Nothing was sent.
 pub fn play(args: &PlayArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics> {
-    if args.json && args.to == Address::Stdout {
-        let fault = Diagnostic::error("play/stdout", "--json and --to stdout would both write to stdout");
+    if args.json && matches!(args.to, Address::Stdout | Address::Stdio) {
+        let fault = Diagnostic::error("play/stdout", "--json and this sink would both write to stdout");
         return Err(fault.hint("leave out --json: the report is on stderr").into());
     }
     let places = Places { mission: args.mission.as_deref(), map: args.map.as_deref() };
     let loaded = commands::load(&args.commands, places)?;
-    certified(args, &loaded, terminal)?;
+    let clearance = certified(args, &loaded, terminal)?;
     let LoadedCommands { file, inputs, world, .. } = loaded;
     let (robot, table) = (world.robot, file.table);
     let file_step = table.sampling_time;
@@ -95,6 +104,18 @@ pub fn play(args: &PlayArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics>
         None => (motion, 0),
         Some(time) => from_within(&motion, &limits, time, file_step)?,
     };
+    let following = Following {
+        args: &args.feedback,
+        robot: &robot,
+        motion: &motion,
+        limits: &limits,
+        reverse: inputs.mission.reverse,
+        clearance,
+    };
+    if args.to == Address::Stdio {
+        let phase = following.lines(&mut std::io::stdin().lock(), &mut std::io::stdout().lock())?;
+        return Ok(u8::from(phase != Phase::Done));
+    }
     let what = Play { motion: &motion, limits: &limits, first_row, file_step };
     let world = sinks::World { robot: &robot, urdf: &inputs.urdf.text, table: motion.table() };
     let mut sink = sinks::open(&args.to, args.joints.as_ref(), &args.sinks, &world)?;
@@ -117,6 +138,17 @@ pub fn play(args: &PlayArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics>
     ));
     // Last: sinks have threads of their own, which are not to be as urgent.
     let urgent = realtime::ask_for();
+    if let Some(source) = &args.feedback.feedback {
+        let asked = || requests.load(Ordering::SeqCst);
+        let followed = following.live(source, args.sinks.wait, sink.as_mut(), &asked).map_err(not_begun)?;
+        let done = followed.phase == Phase::Done && followed.cut.is_none();
+        if args.json {
+            terminal.print(&feedback::for_programs(&followed));
+        } else {
+            terminal.remark(&feedback::readable(&followed));
+        }
+        return Ok(u8::from(!done));
+    }
     let mut clock = MonotonicClock::new();
     let outcome =
         play::play(&what, sink.as_mut(), &mut clock, &|| requests.load(Ordering::SeqCst)).map_err(not_begun)?;
@@ -129,19 +161,20 @@ pub fn play(args: &PlayArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics>
     Ok(u8::from(outcome.ending != Ending::Complete))
 }
 
-/// Refuses what is not certified, unless asked not to.
-fn certified(args: &PlayArgs, loaded: &LoadedCommands, terminal: &mut Terminal) -> Result<(), Diagnostics> {
+/// Refuses what is not certified, unless asked not to. The clearance that is proven, m.
+fn certified(args: &PlayArgs, loaded: &LoadedCommands, terminal: &mut Terminal) -> Result<Option<f64>, Diagnostics> {
     if !loaded.as_made {
         terminal.remark("note: the mission, robot or map are not the ones that the file was made from\n");
     }
     let certificate = loaded.certify()?;
-    let Some(first) = certificate.refusals.first() else { return Ok(()) };
+    let clearance = certificate.clearance_proven;
+    let Some(first) = certificate.refusals.first() else { return Ok(clearance) };
     let more = certificate.refusals.len() - 1;
     let more = if more == 0 { String::new() } else { format!(" (and {more} more)") };
     let message = format!("`{}` is not certified: {}{more}", args.commands.display(), first.message);
     if args.force {
         terminal.remark(&format!("warning: {message}; played by --force\n"));
-        return Ok(());
+        return Ok(clearance);
     }
     let hint = "`trajc check` says all that is wrong; --force plays it nevertheless";
     Err(Diagnostic::failure("play/not-certified", message).hint(hint).into())

@@ -7,6 +7,8 @@ pub(crate) mod fd;
 pub mod gjk;
 pub mod halton;
 pub mod lbfgs;
+#[cfg(test)]
+pub(crate) mod noise;
 pub mod pentadiagonal;
 pub mod poly;
 pub mod quadrature;

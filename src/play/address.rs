@@ -7,6 +7,8 @@ use std::str::FromStr;
 pub enum Address {
     /// `stdout`.
     Stdout,
+    /// `stdio`: poses in, commands out, time by the poses.
+    Stdio,
     /// `udp://HOST:PORT`.
     Udp {
         /// `HOST:PORT`.
@@ -51,7 +53,7 @@ impl FromStr for Address {
     fn from_str(text: &str) -> Result<Self, String> {
         let unknown = || {
             Err(format!(
-                "no sink `{text}`; there are stdout, udp://HOST:PORT, can:IFACE, can:udp://HOST:PORT, ros2, zenoh[:ENDPOINT] and \
+                "no sink `{text}`; there are stdout, stdio, udp://HOST:PORT, can:IFACE, can:udp://HOST:PORT, ros2, zenoh[:ENDPOINT] and \
                  foxglove[://HOST:PORT]"
             ))
         };
@@ -80,6 +82,7 @@ impl FromStr for Address {
         }
         match text {
             "stdout" => Ok(Self::Stdout),
+            "stdio" => Ok(Self::Stdio),
             "ros2" => Ok(Self::Ros2),
             "zenoh" => Ok(Self::Zenoh { endpoint: ROUTER.to_owned() }),
             "foxglove" => Ok(Self::Foxglove { host: "127.0.0.1".to_owned(), port: FOXGLOVE_PORT }),
@@ -118,6 +121,7 @@ mod tests {
     #[test]
     fn every_kind_of_sink_is_named_by_its_address() {
         assert_eq!(parse("stdout"), Address::Stdout);
+        assert_eq!(parse("stdio"), Address::Stdio);
         assert_eq!(parse("udp://robot.local:9870"), Address::Udp { to: "robot.local:9870".into() });
         assert_eq!(parse("udp://[::1]:9870"), Address::Udp { to: "[::1]:9870".into() });
         assert_eq!(parse("can:can0"), Address::Can { interface: "can0".into() });

@@ -8,6 +8,7 @@
 //! | `motion.rs` | a command table that can be driven at another pace |
 //! | `pace.rs` | slowing down and setting off along the path within limits: pure |
 //! | `player.rs`, `clock.rs`, `jitter.rs` | the schedule, its clock (monotonic or simulated), how well it was kept |
+//! | `tracking/`, `follow.rs`, `poses.rs` | with feedback: the law (pure), its loop in real time, where poses come from |
 //! | `sink.rs`, `address.rs` | what a receiver is to the player; how one is named |
 //! | `sinks/` | one file each |
 
@@ -15,13 +16,16 @@ pub mod address;
 pub mod clock;
 #[cfg(test)]
 mod fixtures;
+pub mod follow;
 pub mod jitter;
 pub mod motion;
 pub mod pace;
 mod player;
+pub mod poses;
 pub mod realtime;
 pub mod sink;
 pub mod sinks;
+pub mod tracking;
 
 pub use clock::{Clock, MonotonicClock, SimulatedClock};
 pub use jitter::JitterReport;

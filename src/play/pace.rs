@@ -40,6 +40,11 @@ impl Limits {
         let joints = robot.joints.iter().enumerate().map(|(j, joint)| of(2 + j, &joint.limits, 1.0));
         Self(wheels.into_iter().chain(joints).collect())
     }
+
+    /// Of each actuator per second: speed, acceleration, jerk, where a row is held for `hold` seconds.
+    pub fn per_second(&self, hold: f64) -> Vec<[f64; 3]> {
+        self.0.iter().map(|[speed, first, second]| [*speed, first / hold, second / (hold * hold)]).collect()
+    }
 }
 
 /// A change of pace from 1 to 0: its rate is a trapezoid in time.

@@ -55,6 +55,7 @@ fn any_map() -> MapSpec {
         origin: None,
         keep_out: Vec::new(),
         boxes: Vec::new(),
+        speed_zones: Vec::new(),
     }
 }
 

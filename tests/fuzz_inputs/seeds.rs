@@ -285,6 +285,7 @@ pub fn recordings() -> Vec<Vec<u8>> {
         urdf: CONV,
         report: "{}",
         path_csv: None,
+        start_file: None,
         meshes: &[],
     })
     .expect("numbers are finite");

@@ -18,9 +18,9 @@ pub(super) struct SinkArgs {
     /// Lines of `--to stdout`.
     #[arg(long, value_name = "FORMAT", default_value = "csv")]
     format: LineFormat,
-    /// ros2, zenoh, foxglove: seconds to wait for somebody who listens.
+    /// ros2, zenoh, foxglove: seconds to wait for somebody who listens; with --feedback, for the first pose.
     #[arg(long, value_name = "S", default_value = "10", value_parser = wait)]
-    wait: f64,
+    pub wait: f64,
     /// ros2, zenoh, foxglove: these topics alone, separated by commas, such as /cmd_vel.
     #[arg(long, value_name = "TOPIC", value_delimiter = ',')]
     topics: Vec<String>,
@@ -81,6 +81,10 @@ fn one<'a>(
         Address::Stdout => {
             let lines = if args.format == LineFormat::Csv { Lines::Csv } else { Lines::Json };
             Ok(Box::new(StreamSink::new(std::io::stdout(), lines)))
+        }
+        Address::Stdio => {
+            let fault = Diagnostic::error("play/stdio", "stdio is no second sink: commands answer poses there");
+            Err(fault.hint("--joints SINK goes with a sink in real time").into())
         }
         Address::Udp { to } => Ok(Box::new(UdpSink::new(to).map_err(fault)?)),
         Address::CanOverUdp { to, local } => on_a_bus(|| Cannelloni::new(to, *local), joints_elsewhere, world),
@@ -148,7 +152,7 @@ fn transport(
         Address::Ros2 => Err(not_built("ros2")),
         #[cfg(not(feature = "zenoh"))]
         Address::Zenoh { .. } => Err(not_built("zenoh")),
-        Address::Stdout | Address::Udp { .. } | Address::Can { .. } | Address::CanOverUdp { .. } => {
+        Address::Stdout | Address::Stdio | Address::Udp { .. } | Address::Can { .. } | Address::CanOverUdp { .. } => {
             Err(Diagnostic::error("play/topics", "this sink has no topics").into())
         }
     }

@@ -1,0 +1,132 @@
+#!/usr/bin/env python3
+"""Closes the loop of `trajc play --to stdio` on a physics engine (MuJoCo): a command file on a base with wrong wheels, latency and slip.
+
+    closed_loop_mujoco.py COMMANDS.csv --mission M.yaml --bench FOLDER [--trajc trajc] [--only TEXT] [--json]
+
+FOLDER holds `replay_mujoco.py`, the bench that replays command files open loop: its model of base, wheels, servos and obstacles is used as it
+is; only the commands come from trajc here, one for each pose. Poses come at 20 Hz, with 5 mm and half a degree of noise (fixed seed).
+Exit: 0 every case ends within 10 mm and 1 degree without contact, 1 one does not, 2 bad input.
+"""
+import argparse
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+PERIOD, NOISE, TURN_NOISE, END, TURN_END = 0.05, 0.005, math.radians(0.5), 0.010, math.radians(1.0)
+
+
+def closed(bench, mujoco, trajc, seed, joints, sides):
+    """Drives until trajc says that it is over; ((m, rad) off the end, its last answer, poses, least clearance asked for)."""
+    random, run, data, step = np.random.default_rng(seed), bench.run, bench.data, bench.run.timestep
+    every, late = round(PERIOD / step), run.latency
+    rates, targets = np.zeros(len(bench.dofs)), bench.targets[0].copy()
+    wheels = len(bench.wheels)
+    moves = [np.zeros(len(bench.dofs))] * 2
+    waiting, answer, answers = [], None, 0
+    log = []
+    for n in range(round(-0.5 / step), 10 ** 7):
+        now = n * step
+        if n >= 0 and n % every == 0 and (answer is None or answer["state"] not in ("done", "stopped")):
+            turn = data.xmat[bench.base].reshape(3, 3)
+            yaw = math.atan2(turn[1, 0], turn[0, 0])
+            x, y = data.qpos[:2] + NOISE * random.standard_normal(2)
+            pose = {"t": now, "x": x, "y": y, "yaw": yaw + TURN_NOISE * random.standard_normal()}
+            trajc.stdin.write(json.dumps(pose) + "\n")
+            trajc.stdin.flush()
+            line = trajc.stdout.readline()
+            if not line:
+                raise RuntimeError("trajc ended: " + trajc.stderr.read())
+            answer, answers = json.loads(line), answers + 1
+            waiting.append((now + late, answer))
+            ended = now
+        while waiting and waiting[0][0] <= now + 1e-9:
+            _, command = waiting.pop(0)
+            new = np.zeros(len(bench.dofs))
+            for k, side in enumerate(sides):
+                new[k] = bench.wheels[k][1] * command[f"wheel_{side}_rad_s"]
+            for k, (source, multiplier, offset) in enumerate(joints, wheels):
+                of = command["joints"].get(source)
+                if of:
+                    new[k], targets[k] = multiplier * of["velocity"], multiplier * of["position"] + offset
+            rates = new
+        data.ctrl[0::2], data.ctrl[1::2] = targets, rates
+        data.qfrc_applied[bench.held] = data.qfrc_bias[bench.held]
+        mujoco.mj_step(bench.model, data)
+        targets = targets + rates * step
+        if n >= 0:
+            pairs, deep = data.contact.geom, data.contact.dist
+            for i in np.flatnonzero(bench.is_wall[pairs].any(1) & (deep <= 0)) if len(bench.walls) else ():
+                bench.contacts.setdefault(tuple(int(g) for g in pairs[i]), now)
+        if answer and answer["state"] in ("done", "stopped") and now > ended + late + 1.0:
+            break
+        if now > 4 * bench.time[-1] + 30:
+            break
+    last = [bench.columns[name][-1] for name in ("x_m", "y_m", "yaw_rad")]
+    turn = data.xmat[bench.base].reshape(3, 3)
+    off = math.atan2(turn[1, 0], turn[0, 0]) - last[2]
+    return math.hypot(data.qpos[0] - last[0], data.qpos[1] - last[1]), abs(math.atan2(math.sin(off), math.cos(off))), answer, ended
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("commands")
+    parser.add_argument("--mission", required=True)
+    parser.add_argument("--bench", required=True)
+    parser.add_argument("--trajc", default="trajc")
+    parser.add_argument("--only", default="", help="cases whose name has this in it")
+    parser.add_argument("--json", action="store_true")
+    args = parser.parse_args()
+    sys.path.insert(0, args.bench)
+    import mujoco
+    import replay_mujoco as bench_file
+    from check_commands import joint_column, read_commands, read_mission
+    from oracle_maps import read_yaml
+
+    task, columns = read_mission(args.mission, {}), read_commands(args.commands)[1]
+    robot, robot_file = task.robot, Path(args.mission).parent / read_yaml(args.mission)["robot"]
+    if not robot.moving_named:
+        robot.hold([name for name in robot.moving if f"joint.{name}." not in " ".join(columns)])
+    urdf = ElementTree.parse(robot_file.parent / read_yaml(robot_file)["urdf"]).getroot()
+    lo, hi = np.zeros((0, 3)), np.zeros((0, 3))
+    if task.world:
+        _, high, radius = robot.extents({name: np.unique(joint_column(columns, name, "pos").round(2)) for name in robot.moving})
+        path = np.column_stack([columns["x_m"], columns["y_m"]])
+        lo, hi = bench_file.near_boxes(task.world, path, radius + bench_file.REACH, high[2] + 0.2)
+    plain = dict(wheel_radius_error=0.0, radius_difference=0.0, track_error=0.0, latency=0.0, friction=0.8, bandwidth=10.0,
+                 joint_bandwidth=5.0, timestep=0.001, servo="pi")
+    fine, rows = True, {}
+    for name, change in bench_file.CASES.items():
+        if args.only not in name:
+            continue
+        run = argparse.Namespace(**{**plain, **change})
+        bench = bench_file.Bench(robot, urdf, columns, lo, hi, run)
+        free = bench.figures(bench.replay())
+        bench = bench_file.Bench(robot, urdf, columns, lo, hi, run)
+        names = [bench.model.actuator(i).name for i in range(0, bench.model.nu, 2)][len(bench.wheels):]
+        joints = [robot.source(robot.joints[joint]) for joint in names]
+        sides = ["left" if wheel[2][1] > 0 else "right" for wheel in bench.wheels]
+        command = [args.trajc, "play", args.commands, "--mission", args.mission, "--to", "stdio"]
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as trajc:
+            metres, radians, answer, ended = closed(bench, mujoco, trajc, 1, joints, sides)
+            trajc.stdin.close()
+        good = metres <= END and radians <= TURN_END and not bench.contacts and answer["state"] == "done"
+        fine &= good
+        rows[name] = {"open_end_m": free["end_point_m"], "open_heading_rad": free["heading_end"], "open_contacts": len(free["contacts"]), "end_m": metres,
+                      "heading_rad": radians, "contacts": len(bench.contacts), "state": answer["state"], "reason": answer.get("reason"), "time_s": ended, "good": good}
+        if not args.json:
+            own = rows[name]
+            print(f"{name:<26} open {1e3 * own['open_end_m']:8.1f} mm {math.degrees(abs(own['open_heading_rad'])):6.2f} deg"
+                  f"{' CONTACT' if own['open_contacts'] else ''} | closed {1e3 * metres:6.1f} mm {math.degrees(radians):5.2f} deg  {answer['state']}"
+                  f" {answer.get('reason') or ''} {ended:.1f} s for {bench.time[-1]:.1f} s{'  CONTACT' if bench.contacts else ''}", flush=True)
+    if args.json:
+        print(json.dumps(rows, indent=1))
+    return 0 if fine else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,139 @@
+//! `trajc calibrate LOG --robot ROBOT.yaml`.
+
+use std::path::PathBuf;
+
+use super::output::write_file;
+use super::terminal::Terminal;
+use crate::calibrate::{self, Fit, PoseNoise, RewriteError};
+use crate::diag::{Diagnostic, Diagnostics};
+use crate::inputs::{Disk, read_robot_files};
+use crate::mission::LimitsSpec;
+use crate::robot::{self, RobotInputs};
+
+/// Wheel radii and track width from a log of wheel angles and poses.
+///
+/// Writes the mean radius and the track under `drive` of robot.yaml, and what remains uncertain (three standard deviations, and the
+/// difference between the wheels) under `tolerance`. All else in the file stays as it is.
+///
+/// The log is CSV with the columns time_s, wheel_left_rad, wheel_right_rad, x_m, y_m, yaw_rad: angles of the wheels, not wrapped, and poses
+/// of the base, on one clock. A row may leave its pose or its wheels empty. missions/calibrate.yaml is a motion that shows all.
+///
+/// Exit 0: calibrated. 2: bad input, or a log that does not show radii and track.
+#[derive(Debug, clap::Args)]
+pub struct CalibrateArgs {
+    /// The log (.csv).
+    log: PathBuf,
+    /// The robot.yaml that gets the calibration.
+    #[arg(long, value_name = "ROBOT.yaml")]
+    robot: PathBuf,
+    /// Print what would be written, and write nothing.
+    #[arg(long)]
+    dry_run: bool,
+    /// Standard deviation of the poses' coordinates, in metres.
+    #[arg(long, value_name = "M", default_value = "0.005", value_parser = positive)]
+    noise_m: f64,
+    /// Standard deviation of the poses' headings, in radians.
+    #[arg(long, value_name = "RAD", default_value = "0.0087", value_parser = positive)]
+    noise_rad: f64,
+    /// Print the calibration with its covariance as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|v| (1e-9..=1e3).contains(v)).ok_or_else(|| "expected a number above 0".to_owned())
+}
+
+/// Calibrates.
+///
+/// # Errors
+/// Bad input; a log whose motions do not determine the drive.
+pub fn calibrate(args: &CalibrateArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics> {
+    let mut disk = Disk::default();
+    let name = args.log.display().to_string();
+    let text = disk.text(&args.log, None)?.text;
+    let log = calibrate::read_csv(&text)
+        .map_err(|error| Diagnostics::from(Diagnostic::error("calibrate/log", error).file(&name)))?;
+    let (spec, yaml, urdf) = read_robot_files(&args.robot, &disk, None)?;
+    let Some(yaml) = yaml else {
+        let fault = Diagnostic::error("calibrate/urdf", format!("`{}` is a URDF", args.robot.display()));
+        return Err(fault.hint("write a robot.yaml for it: trajc robot init FILE.urdf --out robot.yaml").into());
+    };
+    let model = robot::parse(RobotInputs {
+        spec: &spec,
+        urdf: (&urdf.name, &urdf.text),
+        files: &mut disk,
+        overrides: &LimitsSpec::default(),
+    })?;
+    let guess = [model.wheel_radius, model.wheel_radius, model.track_width];
+    let noise = PoseNoise { metres: args.noise_m, radians: args.noise_rad };
+    let fit = calibrate::fit(&log, guess, noise).map_err(|error| {
+        let hint = error.hint();
+        Diagnostics::from(Diagnostic::error("calibrate/undetermined", error).file(&name).hint(hint))
+    })?;
+    let new = calibrate::rewrite(&yaml.name, &yaml.text, &fit).map_err(|error| match error {
+        RewriteError::Yaml(faults) => faults,
+        RewriteError::NotATable(key) => {
+            Diagnostic::error("calibrate/robot", format!("`{key}` is no table")).file(&yaml.name).into()
+        }
+    })?;
+    let text = if args.json { json(&fit, guess) } else { readable(&fit, guess) };
+    terminal.print(&text);
+    if !args.dry_run {
+        write_file(&args.robot, new.as_bytes())?;
+        terminal.remark(&format!("{}: written\n", args.robot.display()));
+    } else if !args.json {
+        let old: Vec<&str> = yaml.text.lines().collect();
+        let changed: String =
+            new.lines().filter(|line| !old.contains(line)).map(|line| format!("  {line}\n")).collect();
+        terminal.print(&format!("would write into {}:\n{changed}", args.robot.display()));
+    }
+    Ok(0)
+}
+
+fn readable(fit: &Fit, guess: [f64; 3]) -> String {
+    let [radius, difference, track] = fit.deviations();
+    let change = |new: f64, old: f64| 100.0 * (new / old - 1.0);
+    let r = fit.remaining();
+    format!(
+        "wheel radius   {:.6} m ± {:.6} ({:+.3} %); left {:.6} m, right {:.6} m\nright wheel    {:+.3} % larger than the left one ± {:.3}\n\
+         track width    {:.5} m ± {:.5} ({:+.3} %)\nfrom           {} pairs of poses, {} of them outliers; residuals {:.2} of the noise\n\
+         remaining      wheel_radius {:.3} %, wheel_difference {:.3} %, track {:.3} % (3 sigma)\n",
+        fit.radius(),
+        radius,
+        change(fit.radius(), guess[0]),
+        fit.geometry[0],
+        fit.geometry[1],
+        100.0 * fit.difference(),
+        100.0 * difference,
+        fit.geometry[2],
+        track,
+        change(fit.geometry[2], guess[2]),
+        fit.pairs,
+        fit.outliers,
+        fit.residual,
+        100.0 * r.wheel_radius,
+        100.0 * r.wheel_difference,
+        100.0 * r.track,
+    )
+}
+
+fn json(fit: &Fit, guess: [f64; 3]) -> String {
+    let [radius, difference, track] = fit.deviations();
+    let remaining = fit.remaining();
+    let value = serde_json::json!({
+        "wheel_radius_m": {"left": fit.geometry[0], "right": fit.geometry[1], "mean": fit.radius(), "sigma": radius, "before": guess[0]},
+        "wheel_difference": {"share": fit.difference(), "sigma": difference},
+        "track_width_m": {"value": fit.geometry[2], "sigma": track, "before": guess[2]},
+        "covariance_m2": {"order": ["left", "right", "track"], "rows": fit.covariance},
+        "pairs": fit.pairs,
+        "outliers": fit.outliers,
+        "residual": fit.residual,
+        "tolerance": {
+            "wheel_radius": remaining.wheel_radius,
+            "wheel_difference": remaining.wheel_difference,
+            "track": remaining.track,
+        },
+    });
+    format!("{value:#}\n")
+}
