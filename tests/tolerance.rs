@@ -27,7 +27,13 @@ fn compiled(mission: &str) -> Compiled {
     let outcome = pipeline::compile(&mut inputs, &CompileOptions::default(), &mut |_| {});
     let done = outcome.compiled.expect("certified");
     let (first, last) = (&done.commands.rows[0], &done.commands.rows[done.commands.rows.len() - 1]);
-    let goal = certify::Goal { x: last.pose.x, y: last.pose.y, yaw: None, joints: vec![None; done.robot.joints.len()] };
+    let goal = certify::Goal {
+        x: last.pose.x,
+        y: last.pose.y,
+        within: 0.0,
+        yaw: None,
+        joints: vec![None; done.robot.joints.len()],
+    };
     let task = Task {
         start: first.pose,
         start_joints: first.joint_positions.clone(),
