@@ -99,7 +99,7 @@ impl Route {
         (a[0] - b[0]).hypot(a[1] - b[1])
     }
 
-    /// All motions in order, cut into pieces. The first one stands still: postures may change before the base moves.
+    /// All motions in order, cut into pieces. The first and the last stand still: postures may change before the base moves, and after.
     pub fn pieces(&self, grain: Grain) -> Vec<BaseMotion> {
         let start = Pose2::new(self.corners[0][0], self.corners[0][1], self.start_yaw);
         let mut out = vec![BaseMotion { from: start, to: start }];
@@ -111,6 +111,7 @@ impl Route {
                 drive_pieces(Pose2::new(corner[0], corner[1], yaw), Pose2::new(next[0], next[1], yaw), grain, &mut out);
             }
         }
+        out.extend(out.last().map(|last| BaseMotion { from: last.to, to: last.to }));
         out
     }
 }

@@ -80,7 +80,7 @@ impl<'a, const W: usize> Shortcutter<'a, W> {
         };
         for (k, heading) in headings.iter().enumerate() {
             let (at, turn) = (checked.route.corners[k], checked.route.turns[k]);
-            let pieces = self.turn_pieces(k, at, *heading, turn);
+            let pieces = self.turn_pieces(k, k + 1 == headings.len(), at, *heading, turn);
             checked.turns.push(pieces.iter().map(|piece| pass(self.collider.free(piece), at)).collect());
             let Some(next) = checked.route.corners.get(k + 1).copied() else { continue };
             let mut pieces = Vec::new();
@@ -94,19 +94,27 @@ impl<'a, const W: usize> Shortcutter<'a, W> {
         if blocked.is_empty() { Ok(checked) } else { Err(blocked) }
     }
 
-    /// Free postures of the pieces of a corner's turn; those of the first corner begin with standing still.
-    fn turn(&self, corner: usize, at: [f64; 2], yaw: f64, turn: f64) -> Masks<W> {
-        let pieces = self.turn_pieces(corner, at, yaw, turn);
+    /// Free postures of the pieces of a corner's turn.
+    fn turn(&self, corner: usize, last: bool, at: [f64; 2], yaw: f64, turn: f64) -> Masks<W> {
+        let pieces = self.turn_pieces(corner, last, at, yaw, turn);
         pieces.iter().map(|p| Some(self.collider.free(p)).filter(|m| !m.is_empty())).collect()
     }
 
-    fn turn_pieces(&self, corner: usize, at: [f64; 2], yaw: f64, turn: f64) -> Vec<BaseMotion> {
+    /// Those of the first corner begin with standing still, those of the last one end with it: what holds only there may be left, or
+    /// taken up, before the base turns, or after.
+    fn turn_pieces(&self, corner: usize, last: bool, at: [f64; 2], yaw: f64, turn: f64) -> Vec<BaseMotion> {
+        let still = |yaw: f64| {
+            let pose = Pose2::new(at[0], at[1], yaw);
+            BaseMotion { from: pose, to: pose }
+        };
         let mut pieces = Vec::new();
         if corner == 0 {
-            let pose = Pose2::new(at[0], at[1], yaw);
-            pieces.push(BaseMotion { from: pose, to: pose });
+            pieces.push(still(yaw));
         }
         spin_pieces(Pose2::new(at[0], at[1], yaw), turn, self.grain, &mut pieces);
+        if last {
+            pieces.push(still(yaw + turn));
+        }
         pieces
     }
 
@@ -217,8 +225,8 @@ impl<'a, const W: usize> Shortcutter<'a, W> {
             return None;
         }
         let drive = self.drive(from, to, headings[a] + turn_a, route.reverse[a])?;
-        let first = self.turn(a, from, headings[a], turn_a)?;
-        let second = self.turn(b, to, headings[a] + turn_a, turn_b)?;
+        let first = self.turn(a, false, from, headings[a], turn_a)?;
+        let second = self.turn(b, at_end, to, headings[a] + turn_a, turn_b)?;
         let set = self.flow(self.flow(self.flow(forward[a], &first), &drive), &second);
         if set.and(backward[b]).is_empty() {
             return None;

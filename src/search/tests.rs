@@ -301,6 +301,34 @@ fn the_start_and_goal_postures_asked_for_are_kept_exactly() {
     assert_eq!(path.states[0].pose, query.start);
 }
 
+/// A bar slides out sideways into a slot that it fits at the goal alone: it does so where the robot stands, and not before.
+#[test]
+fn a_posture_that_is_free_at_the_goal_alone_is_taken_up_there() {
+    let mut robot = small_box();
+    let limits = MotionLimits { speed: Some(0.5), acceleration: Some(1.0), jerk: Some(5.0) };
+    robot.joints = vec![MovingJoint { name: "bar".into(), prismatic: true, lower: 0.0, upper: 0.4, limits }];
+    let slides = BodyMotion { joint: 0, multiplier: 1.0, offset: 0.0, axis: Vector3::y_axis(), prismatic: true };
+    let origin = Isometry3::translation(0.0, 0.0, 0.4);
+    robot.bodies.push(Body { link: "bar".into(), parent: 0, origin, motion: Some(slides) });
+    let convex = Convex::Box { half: [0.03, 0.1, 0.03] };
+    robot.shapes.push(Shape { link: "bar".into(), body: 1, pose: Isometry3::identity(), convex });
+    let mut map = VoxelMap::new(0.05, [0.0; 3], [60, 40, 20], Unknown::Occupied);
+    for x in [[1.5, 1.9], [2.1, 2.5]] {
+        fill(&mut map, [x[0], 1.3, 0.3], [x[1], 1.5, 0.5]);
+    }
+    let query = Query {
+        goal: Pose2::new(2.0, 1.0, 0.0),
+        goal_yaw: Some(0.0),
+        goal_joints: vec![Some(0.4)],
+        ..across(Some(0.0))
+    };
+    let there = find(&map, &robot, &query, 0.03).expect("there is a way");
+    assert_eq!(there.expanded, 0, "the straight way will do");
+    let (start, goal) = (query.goal, Pose2::new(2.7, 1.0, 0.0));
+    let on = Query { start, start_joints: vec![Some(0.4)], goal, goal_joints: vec![Some(0.0)], ..query };
+    assert_eq!(find(&map, &robot, &on, 0.03).expect("out of it again").expanded, 0);
+}
+
 #[test]
 fn a_goal_straight_behind_is_backed_up_to_where_that_is_allowed() {
     let robot = scr_db();
