@@ -44,8 +44,8 @@ fn chi_square(fit: &Fit) -> f64 {
 fn without_noise_radii_and_track_are_found_to_rounding() {
     let fit = fit(&log(&rich(), PoseNoise { metres: 0.0, radians: 0.0 }, 0.0, 1), GUESS, PoseNoise::default())
         .expect("a fit");
-    for k in 0..3 {
-        assert!((fit.geometry[k] - TRUE[k]).abs() < 1e-9, "{:?}", fit.geometry);
+    for (found, truth) in fit.geometry.iter().zip(TRUE) {
+        assert!((found - truth).abs() < 1e-9, "{:?}", fit.geometry);
     }
     assert_eq!(fit.outliers, 0);
 }

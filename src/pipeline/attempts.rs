@@ -79,7 +79,7 @@ impl Tries {
 /// A motion that nothing but the tolerance refuses, and by how much it misses that, m.
 pub(super) struct Nearest {
     short: f64,
-    made: Made,
+    made: Box<Made>,
 }
 
 /// What a stretch has behind it: commands from the mission's start on.
@@ -144,7 +144,7 @@ impl Attempts<'_> {
         nearest: Option<Nearest>,
     ) -> Result<Made, Diagnostics> {
         match (self.certify(run, path.trajectory()), nearest) {
-            (Ok(last), Some(nearest)) if !last.certificate.holds() => Ok(nearest.made),
+            (Ok(last), Some(nearest)) if !last.certificate.holds() => Ok(*nearest.made),
             (last, _) => last,
         }
     }
@@ -232,7 +232,7 @@ impl Attempts<'_> {
                 let least = nearest.as_ref().map_or(f64::INFINITY, |nearest| nearest.short);
                 idle = if short < least - GAINED { 0 } else { idle + 1 };
                 if made.only_the_tolerance_refuses() && short < least {
-                    nearest = Some(Nearest { short, made });
+                    nearest = Some(Nearest { short, made: Box::new(made) });
                 }
                 if short > GAINED && idle >= IDLE {
                     break;
