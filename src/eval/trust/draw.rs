@@ -145,14 +145,16 @@ pub(super) fn robot(rng: &mut Rng) -> RobotModel {
     robot
 }
 
-/// Joint values, the seconds of a row, and 1 to 6 rows.
+/// Joint values, the seconds of a row, and 1 to 6 rows, at times 20 to 60.
 pub(super) fn motion(rng: &mut Rng, joints: usize) -> (Vec<f64>, f64, Vec<Twist>) {
     let values = (0..joints).map(|_| rng.uniform(-1.0, 1.0)).collect();
     let step = decades(rng, 0.02, 0.3);
     // Some only drive, turn, or move joints.
     let (drives, turns, moves) = (!chance(rng, 0.15), !chance(rng, 0.2), !chance(rng, 0.2));
     let on = |on: bool, value: f64| if on { value } else { 0.0 };
-    let rows = (0..rng.integer(1, 6)).map(|_| {
+    let count = if chance(rng, 0.05) { rng.integer(20, 60) } else { rng.integer(1, 6) };
+    let step = if count > 6 { 0.02 } else { step };
+    let rows = (0..count).map(|_| {
         let rates = (0..joints).map(|_| on(moves, rng.uniform(-2.0, 2.0))).collect();
         (on(drives, rng.uniform(-1.0, 1.0)), on(turns, rng.uniform(-3.0, 3.0)), rates)
     });
@@ -171,7 +173,6 @@ pub(super) fn room(rng: &mut Rng) -> VoxelMap {
     let half = rng.uniform(0.8, 1.2);
     let cells = |length: f64| ((length / resolution).ceil() as usize).max(1);
     let outside = if chance(rng, 0.3) { Unknown::Occupied } else { Unknown::Free };
-    // Anywhere, also far from the origin of the cells' own coordinates.
     VoxelMap::new(resolution, [-half, -half, 0.0], [cells(2.0 * half), cells(2.0 * half), cells(0.9)], outside)
 }
 
@@ -199,8 +200,13 @@ pub(super) fn obstacles(rng: &mut Rng, map: &VoxelMap) -> Vec<Vec<[usize; 3]>> {
 pub(super) fn scene(rng: &mut Rng, family: Family) -> Case {
     let robot = robot(rng);
     let (values, step, held) = motion(rng, robot.joints.len());
-    let start = start(rng);
-    let map = room(rng);
+    let (mut start, mut map) = (start(rng), room(rng));
+    if chance(rng, 0.1) {
+        // Far from the map's origin, where coordinates have fewer digits to spare.
+        let away = [rng.uniform(-2000.0, 2000.0), rng.uniform(-2000.0, 2000.0)];
+        (start.x, start.y) = (start.x + away[0], start.y + away[1]);
+        (map.origin[0], map.origin[1]) = (map.origin[0] + away[0], map.origin[1] + away[1]);
+    }
     let mut case = Case::new(family, robot, start, &values, step, &held);
     furnish(rng, &mut case, map);
     case

@@ -40,7 +40,7 @@ pub(super) fn make(family: Family, rng: &mut Rng) -> Case {
 
 /// Asks for the true clearance less (`side` 1) or more (-1) than a small amount.
 fn push(rng: &mut Rng, case: &mut Case, side: f64) -> bool {
-    let delta = decades(rng, PUSH[0], PUSH[1]);
+    let delta = if chance(rng, 0.2) { rng.uniform(1.1e-3, PUSH[1]) } else { decades(rng, PUSH[0], PUSH[1]) };
     let found = least_clearance(case, 0.2 * delta);
     if !found.upper.is_finite() {
         case.task.clearance = rng.uniform(0.0, 0.3);

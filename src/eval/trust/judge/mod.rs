@@ -13,6 +13,7 @@ pub use hunt::Bracket;
 use hunt::{Hunt, Wanted};
 use motion::{Motion, State};
 
+use super::TO_SPARE;
 use super::case::Case;
 use crate::map::VoxelMap;
 use crate::mission::Unknown;
@@ -27,7 +28,7 @@ const TOUCH: f64 = 1e-9;
 pub enum Truth {
     /// Everything is kept; clearances by this much more than is asked for, at least, m.
     Holds {
-        /// Infinite where nothing is asked for.
+        /// Not told apart beyond [`TO_SPARE`]; infinite where nothing is asked for.
         spare: f64,
     },
     /// Something is not: what.
@@ -216,13 +217,13 @@ pub fn judge(case: &Case) -> Finding {
     places::stands(case, &motion, &mut note);
     places::zones(case, &motion, &mut note);
     if !pairs(case).is_empty() {
-        note(decided(own(case, Wanted::AtLeast(TOUCH)), TOUCH, "own links"));
+        note(decided(|wanted| own(case, wanted), TOUCH, "own links").0);
     }
     if let Some(map) = &case.map {
         let required = case.task.clearance.max(TOUCH);
-        let found = clearance(case, map, Wanted::AtLeast(required));
-        met = found.upper;
-        note(decided(found, required, "clearance"));
+        let (truth, upper) = decided(|wanted| clearance(case, map, wanted), required, "clearance");
+        met = upper;
+        note(truth);
     }
     let truth = match (broken.first(), open.first()) {
         (Some(what), _) => Truth::Broken(what.clone()),
@@ -232,16 +233,20 @@ pub fn judge(case: &Case) -> Finding {
     Finding { truth, met }
 }
 
-/// What a bracket says of a distance that is required.
-fn decided(found: Bracket, required: f64, what: &str) -> Truth {
-    let Bracket { lower, upper } = found;
-    if upper < required {
+/// Whether a distance that is required is kept, if so whether with [`TO_SPARE`] besides, and the least distance met.
+fn decided(hunt: impl Fn(Wanted) -> Bracket, required: f64, what: &str) -> (Truth, f64) {
+    let Bracket { lower, upper } = hunt(Wanted::AtLeast(required));
+    let truth = if upper < required {
         Truth::Broken(format!("{what}: {upper:.9} m of {required:.9} m"))
-    } else if lower >= required {
-        Truth::Holds { spare: lower - required }
-    } else {
+    } else if lower < required {
         Truth::Open(format!("{what}: between {lower:.9} and {upper:.9} m of {required:.9} m"))
-    }
+    } else {
+        let more = required + TO_SPARE;
+        let ample = hunt(Wanted::AtLeast(more));
+        let spare = if ample.lower >= more { TO_SPARE } else { lower - required };
+        return (Truth::Holds { spare }, upper.min(ample.upper));
+    };
+    (truth, upper)
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! The judge's bookkeeping of places: where the motion ends, where it stands, and where it is slow.
 
-use super::Truth;
 use super::figures::{angle, at_most};
-use super::hunt::{Hunt, Wanted};
+use super::hunt::Hunt;
 use super::motion::{Motion, State, held};
+use super::{Truth, decided};
 use crate::eval::trust::case::Case;
 
 /// How far from a goal is at it, m.
@@ -92,22 +92,24 @@ pub(super) fn zones(case: &Case, motion: &Motion<'_>, note: &mut impl FnMut(Trut
             if matches!(fast, Truth::Holds { .. }) {
                 continue;
             }
-            let mut hunt = Hunt::new(Wanted::AtLeast(1e-9), 20_000);
-            hunt.over_time(
-                motion.span(row),
-                speed,
-                vec![()],
-                |tau| motion.state(row, tau),
-                |state, (), _| {
-                    let off = beyond(&zone.polygon, [state.x, state.y]);
-                    [(off - 1e-12).max(0.0), off]
-                },
-            );
-            let found = hunt.bracket();
-            note(match (found.upper < 1e-9, found.lower >= 1e-9) {
-                (true, _) => fast,
-                (false, true) => Truth::Holds { spare: found.lower },
-                (false, false) => Truth::Open("a zone's edge".into()),
+            let distance = |wanted| {
+                let mut hunt = Hunt::new(wanted, 20_000);
+                hunt.over_time(
+                    motion.span(row),
+                    speed,
+                    vec![()],
+                    |tau| motion.state(row, tau),
+                    |state, (), _| {
+                        let off = beyond(&zone.polygon, [state.x, state.y]);
+                        [(off - 1e-12).max(0.0), off]
+                    },
+                );
+                hunt.bracket()
+            };
+            // Where the speed itself is in doubt, so is what follows from it.
+            note(match (decided(distance, 1e-9, "a zone's edge").0, fast) {
+                (Truth::Broken(_), fast) => fast,
+                (other, _) => other,
             });
         }
     }
