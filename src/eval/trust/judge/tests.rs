@@ -45,7 +45,7 @@ fn distances_are_those_of_parry_and_their_bounds_meet() {
         let half = Cuboid::new(Vector::new(0.5 * size[0], 0.5 * size[1], 0.5 * size[2]));
         let middle: [f64; 3] = std::array::from_fn(|axis| low[axis] + 0.5 * size[axis]);
         let place = Pose::from_parts(Vector::new(middle[0], middle[1], middle[2]), Rotation::IDENTITY);
-        let truth = query::distance(&pose, &*other, &place, &half).expect("supported");
+        let truth = query::distance(&pose, &*other, &place, &half).expect("supported").distance;
         assert!((truth - upper).abs() < 2e-6, "{convex:?}: {upper}, parry {truth}");
     }
 }
