@@ -193,6 +193,35 @@ fn the_proof_rests_on_nothing_that_planned() {
 }
 
 #[test]
+fn the_judge_of_the_certificate_shares_no_code_with_it() {
+    let judge = source().join("eval/trust/judge");
+    let judges: Vec<File> = files().into_iter().filter(|f| f.path.starts_with(&judge) && !f.is_test()).collect();
+    assert!(judges.len() > 4, "{} files", judges.len());
+    for file in &judges {
+        // The types that hold a case's data; nothing that computes with them but a map's cells.
+        let named: Vec<String> = file.names().into_iter().filter(|name| name != "eval").collect();
+        let data = ["command", "map", "mission", "robot"];
+        assert!(named.iter().all(|name| data.contains(&name.as_str())), "{} names {named:?}", file.path.display());
+        for method in [
+            "twist(",
+            "rim_speeds(",
+            "replay(",
+            "after_twist(",
+            "isometry(",
+            "shape_poses(",
+            "body_poses(",
+            "self_pairs(",
+            "allowed(",
+            "support(",
+            "bounding_radius(",
+        ] {
+            let calls = file.code.match_indices(method).any(|(at, _)| !file.code[..at].ends_with(word));
+            assert!(!calls, "{} calls `{method}`", file.path.display());
+        }
+    }
+}
+
+#[test]
 fn mathematics_knows_no_robot() {
     for file in files().iter().filter(|f| f.module == "math") {
         assert!(file.names().iter().all(|name| name == "math"), "{}: {:?}", file.path.display(), file.names());

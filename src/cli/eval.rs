@@ -1,6 +1,7 @@
 //! `trajc eval`.
 
 mod curves;
+mod trust;
 
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -22,12 +23,14 @@ use crate::robot::{self, Files, RobotInputs, RobotModel, spec};
 /// Compile many scenes and print the paper's tables beside what came out.
 ///
 /// The scenes are those of a suite, drawn from a seed, or of a file (format trajc.scenes/1). They run one after the other on one
-/// core. Success means certified. Exit 0: every scene was judged, failed ones too. 2: bad input.
+/// core. Success means certified. Exit 0: every scene was judged, failed ones too. 1: of trust, something was certified that must not
+/// be. 2: bad input.
 #[derive(Debug, clap::Args)]
 #[command(group(clap::ArgGroup::new("what").required(true).args(["suite", "scenes"])))]
 pub struct EvalArgs {
     /// Draw the scenes of this table of [SCR]; fig5 and fig6: the one scene of a figure; arm: rooms for a robot with an arm; curves: the
-    /// paths of [CONV] section 3 and tighter ones under every time law.
+    /// paths of [CONV] section 3 and tighter ones under every time law; trust: cases made to be hard for the certificate, judged by
+    /// brute force.
     #[arg(long)]
     suite: Option<Which>,
     /// Read the scenes from a file.
@@ -37,12 +40,16 @@ pub struct EvalArgs {
     /// arm]. Any number of joints.
     #[arg(long, value_name = "PATH")]
     robot: Option<PathBuf>,
-    /// Scenes for each number of boxes, or kind of room [default: the paper's 500, 200 or 120]; of a file: the first N [default: all].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=5000))]
+    /// Scenes for each number of boxes, or kind of room [default: the paper's 500, 200 or 120]; of a file: the first N [default: all];
+    /// of trust: cases in all [default: 1400].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     count: Option<u32>,
     /// Seed of a suite [default: 1].
     #[arg(long, value_name = "SEED", conflicts_with = "scenes")]
     seed: Option<u64>,
+    /// Of trust only this case, with all that was found.
+    #[arg(long, value_name = "INDEX", conflicts_with_all = ["scenes", "count"])]
+    scene: Option<u64>,
     /// Boxes a scene, for table3 [default: 10,20,35].
     #[arg(long, value_name = "N", value_delimiter = ',', conflicts_with = "scenes",
           value_parser = clap::value_parser!(u16).range(1..=60))]
@@ -76,14 +83,16 @@ enum Which {
     Scenes(Suite),
     /// Paths.
     Curves,
+    /// Cases for the certificate.
+    Trust,
 }
 
 impl ValueEnum for Which {
     fn value_variants<'a>() -> &'a [Self] {
-        use Which::{Curves, Scenes};
-        const ALL: [Which; 7] = {
+        use Which::{Curves, Scenes, Trust};
+        const ALL: [Which; 8] = {
             let [a, b, c, d, e, f] = Suite::ALL;
-            [Scenes(a), Scenes(b), Scenes(c), Scenes(d), Scenes(e), Scenes(f), Curves]
+            [Scenes(a), Scenes(b), Scenes(c), Scenes(d), Scenes(e), Scenes(f), Curves, Trust]
         };
         &ALL
     }
@@ -94,6 +103,10 @@ impl ValueEnum for Which {
             Self::Curves => Some(
                 PossibleValue::new("curves").help("The curves of [CONV] section 3, and hairpins, under every time law"),
             ),
+            Self::Trust => Some(
+                PossibleValue::new("trust")
+                    .help("The certificate against cases made to be hard for it, judged by brute force"),
+            ),
         }
     }
 }
@@ -103,10 +116,13 @@ impl EvalArgs {
     fn scene_suite(&self) -> Option<Suite> {
         match self.suite {
             Some(Which::Scenes(suite)) => Some(suite),
-            Some(Which::Curves) | None => None,
+            Some(Which::Curves | Which::Trust) | None => None,
         }
     }
 }
+
+/// Scenes that are held in memory at once, at most.
+const MOST_SCENES: u32 = 5000;
 
 /// Robots that suites run with where none is named: name, robot.yaml, URDF.
 const SCR_DB: [&str; 3] =
@@ -124,6 +140,17 @@ const ARM7: [&str; 3] =
 pub fn eval(args: &EvalArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics> {
     if args.suite == Some(Which::Curves) {
         return curves::eval(args, terminal);
+    }
+    if args.suite == Some(Which::Trust) {
+        return trust::eval(args, terminal);
+    }
+    if args.scene.is_some() {
+        let fault = Diagnostic::error("eval/scene", "`--scene` is for the suite `trust`");
+        return Err(fault.hint("leave `--scene` out, or add `--suite trust`").into());
+    }
+    if args.count.is_some_and(|count| count > MOST_SCENES) {
+        let fault = Diagnostic::error("eval/count", format!("`--count` is above {MOST_SCENES}"));
+        return Err(fault.hint("only `--suite trust` takes more").into());
     }
     let disk = Disk::default();
     let (mut set, text) = scenes(args, &disk)?;

@@ -25,6 +25,7 @@ mod scenes;
 mod statistics;
 pub mod tables;
 mod text_table;
+pub mod trust;
 mod turns;
 
 pub use arm_table::ArmRow;

@@ -58,6 +58,7 @@ fn refuse_what_has_no_meaning(args: &EvalArgs) -> Result<(), Diagnostics> {
         ("--robot", args.robot.is_some()),
         ("--count", args.count.is_some()),
         ("--seed", args.seed.is_some()),
+        ("--scene", args.scene.is_some()),
         ("--boxes", !args.boxes.is_empty()),
         ("--parameterisation", args.parameterisation.is_some()),
         ("--write-scenes", args.write_scenes.is_some()),
