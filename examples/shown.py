@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What calibration, feedback and tolerance are worth on a physics engine (MuJoCo): the tables of README.md.
 
-    shown.py --bench FOLDER [--trajc trajc] [--missions first,site_tolerance] [--only TEXT] [--robots 20] [--jobs 2] [--json FILE]
+    shown.py --bench FOLDER [--trajc trajc] [--missions first,site_tolerance] [--only TEXT] [--ways open,feedback] [--robots 20] [--jobs 2] [--json FILE]
 
 FOLDER holds `replay_mujoco.py`; see closed_loop_mujoco.py. Each mission is driven by robots that are not the model's:
   open        its file, no poses
@@ -139,8 +139,23 @@ def case(task):
         found[way] = {"end_m": float(metres), "end_rad": float(radians), "lateral_m": float(watch.lateral), "filled": float(watch.filled),
                       "contacts": len(bench.contacts), "state": state, "note": remark}
 
-    bench = build(bench_file, robot, urdf, columns, lo, hi, disturbed(change))
-    note("open", *free(bench, columns, room), bench)
+    if "open" in args.ways:
+        bench = build(bench_file, robot, urdf, columns, lo, hi, disturbed(change))
+        note("open", *free(bench, columns, room), bench)
+    if "calibrated" in args.ways:
+        note("calibrated", *by_calibration(args, bench_file, mission, change, folder, (robot, urdf, lo, hi)))
+    if "feedback" in args.ways:
+        bench = build(bench_file, robot, urdf, columns, lo, hi, disturbed(change))
+        watch = Watch(bench, columns, room)
+        command = [args.trajc, "play", str(commands), "--mission", str(original), "--to", "stdio"]
+        metres, radians, answer, _ = drive(command, bench, mujoco, 1, watch)
+        note("feedback", metres, radians, watch, bench, answer["state"], answer.get("reason") or "")
+    return mission, name, found
+
+
+def by_calibration(args, bench_file, mission, change, folder, truth):
+    """A mission compiled with what calibration says, without poses; what `note` takes."""
+    robot, urdf, lo, hi = truth
     robot_name = re.search(r"robots/(\w+)/", (HOME / "missions" / f"{mission}.yaml").read_text())[1]
     yaml, remark = calibrated_robot(args, bench_file, robot_name, change, folder / "calibration"), ""
     own = mission_file(mission, folder / "calibrated", mission, yaml)
@@ -151,13 +166,7 @@ def case(task):
     new = prepare(bench_file, own, again)[2]
     bench = build(bench_file, robot, urdf, new, lo, hi, disturbed(change))
     own_room = json.loads((again.parent / "report.json").read_text())["certificate"]["clearance_proven_m"]
-    note("calibrated", *free(bench, new, own_room), bench, remark=remark)
-    bench = build(bench_file, robot, urdf, columns, lo, hi, disturbed(change))
-    watch = Watch(bench, columns, room)
-    command = [args.trajc, "play", str(commands), "--mission", str(original), "--to", "stdio"]
-    metres, radians, answer, _ = drive(command, bench, mujoco, 1, watch)
-    note("feedback", metres, radians, watch, bench, answer["state"], answer.get("reason") or "")
-    return mission, name, found
+    return (*free(bench, new, own_room), bench, "done", remark)
 
 
 def within(task):
@@ -212,22 +221,23 @@ def main():
     parser.add_argument("--trajc", default="trajc")
     parser.add_argument("--missions", default=MISSIONS)
     parser.add_argument("--only", default="", help="cases whose name has this in it")
+    parser.add_argument("--ways", default=",".join(WAYS))
     parser.add_argument("--robots", type=int, default=20, help="robots within a tolerance")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--json", help="all figures, to this file")
     args = parser.parse_args()
-    found, fine = {}, True
+    found, fine, ways = {}, True, [way for way in WAYS if way in args.ways.split(",")]
     missions, names = args.missions.split(","), [name for name in CASES if args.only in name]
     with tempfile.TemporaryDirectory() as work, ProcessPoolExecutor(args.jobs) as pool:
         tasks = [(args, mission, name, Path(work) / mission / str(k)) for mission in missions for k, name in enumerate(names)]
         for mission, name, own in pool.map(case, tasks):
             found.setdefault(mission, {})[name] = own
-            print(f"{mission:<20}{name:<20}" + " | ".join(cell(own[way]) for way in WAYS) + "".join(f"  ({own[way]['note']})" for way in WAYS if own[way]["note"]), flush=True)
-            last = own["feedback"]
-            fine &= last["end_m"] <= END and last["end_rad"] <= TURN_END and last["filled"] <= 1 and not last["contacts"] and last["state"] == "done"
-        print("\n| robot | " + " | ".join(WAYS) + " |\n|---|" + "---|" * len(WAYS))
+            print(f"{mission:<20}{name:<20}" + " | ".join(cell(own[way]) for way in own) + "".join(f"  ({own[way]['note']})" for way in own if own[way]["note"]), flush=True)
+            last = own.get("feedback")
+            fine &= last is None or last["end_m"] <= END and last["end_rad"] <= TURN_END and last["filled"] <= 1 and not last["contacts"] and last["state"] == "done"
+        print("\n| robot | " + " | ".join(ways) + " |\n|---|" + "---|" * len(ways))
         for name in names if found else ():
-            print(f"| {name} | " + " | ".join(worst([found[mission][name][way] for mission in missions]) for way in WAYS) + " |")
+            print(f"| {name} | " + " | ".join(worst([found[mission][name][way] for mission in missions]) for way in ways) + " |")
         tolerant = [mission for mission in missions if mission.endswith("_tolerance")]
         tasks = [(args, mission, k, Path(work) / "within" / mission / str(k)) for mission in tolerant for k in range(args.robots)]
         robots = list(pool.map(within, tasks))
@@ -236,7 +246,7 @@ def main():
             touching, least, farthest = sum(row[1] > 0 for row in own), min(row[2] for row in own), max(row[3] for row in own)
             print(f"{mission}: {len(own)} robots within its tolerance: {touching} touch, least clearance {1e3 * least:.1f} mm, up to {1e3 * farthest:.0f} mm off the end")
             fine &= touching == 0
-            found[mission]["within"] = {"robots": len(own), "touching": touching, "clearance_min_m": least, "end_max_m": farthest}
+            found.setdefault(mission, {})["within"] = {"robots": len(own), "touching": touching, "clearance_min_m": least, "end_max_m": farthest}
     if args.json:
         Path(args.json).write_text(json.dumps(found, indent=1) + "\n")
     return 0 if fine else 1
