@@ -5,15 +5,14 @@
 
 FOLDER holds `replay_mujoco.py`, the bench that replays command files open loop: its model of base, wheels, servos and obstacles is used as it
 is; only the commands come from trajc here, one for each pose. Poses come at 20 Hz, with 5 mm and half a degree of noise (fixed seed).
-The bench sets castors that hold the base's ends exactly on the floor. A base with one at either end then stands on them, its wheels in the air,
-as soon as its wheels are smaller than the URDF's: no tyre forces at all, and the robot spins away. A real base has castors with play, so here
-those that the bench adds hang 1 mm higher.
+The bench sets rigid castors exactly on the floor. A base with some at either end stands on them, its wheels in the air, as soon as its wheels
+are smaller than the URDF's: no tyre forces at all, and the robot spins away. Real castors or wheels have springs or play, so here castors of
+such a base hang 1 mm higher.
 Exit: 0 every case ends within 10 mm and 1 degree without contact, 1 one does not, 2 bad input.
 """
 import argparse
 import json
 import math
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -21,16 +20,17 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-PLAY = 0.001  # m, between the floor and castors that the bench adds: wheels of 80 mm may be 1.2 % smaller
+PLAY = 0.001  # m, between the floor and castors: wheels of 80 mm may be 1.2 % smaller
 PERIOD, NOISE, TURN_NOISE, END, TURN_END = 0.05, 0.005, math.radians(0.5), 0.010, math.radians(1.0)
 
 
 def build(bench_file, *arguments):
-    """A bench whose added castors have play. Castors are the base's first shapes, balls without a name; the robot's own come first."""
+    """A bench whose castors have play where they stand on either side of the axle. They are the base's first shapes, balls without a name."""
     bench = bench_file.Bench(*arguments)
-    model, own = bench.model, int(re.search(r"castors: (\d+) own", bench.note)[1])
+    model = bench.model
     feet = [g for g in range(model.ngeom) if model.geom_bodyid[g] == bench.base and not model.geom(g).name]
-    model.geom_pos[feet[own:], 2] += PLAY
+    if len(feet) and model.geom_pos[feet, 0].max() > 0 > model.geom_pos[feet, 0].min():
+        model.geom_pos[feet, 2] += PLAY
     return bench
 
 
@@ -114,9 +114,18 @@ def drive(command, bench, mujoco, seed, seen=lambda path_time: None):
     return result
 
 
+def postures(robot, columns):
+    """{joint: its values}, each posture of a file once, to a hundredth."""
+    find = lambda joint: next(values for name, values in columns.items() if name.startswith(f"joint.{joint}.pos_"))
+    if not robot.moving:
+        return {}
+    rows = np.unique(np.column_stack([find(name) for name in robot.moving]).round(2), axis=0)
+    return dict(zip(robot.moving, rows.T))
+
+
 def prepare(bench_file, mission, commands):
     """(robot, URDF, columns, low and high corners of the boxes near the path), as a bench takes them."""
-    from check_commands import joint_column, read_commands, read_mission
+    from check_commands import read_commands, read_mission
     from oracle_maps import read_yaml
 
     task, columns = read_mission(mission, {}), read_commands(commands)[1]
@@ -126,7 +135,7 @@ def prepare(bench_file, mission, commands):
     urdf = ElementTree.parse(robot_file.parent / read_yaml(robot_file)["urdf"]).getroot()
     lo, hi = np.zeros((0, 3)), np.zeros((0, 3))
     if task.world:
-        _, high, radius = robot.extents({name: np.unique(joint_column(columns, name, "pos").round(2)) for name in robot.moving})
+        _, high, radius = robot.extents(postures(robot, columns))
         path = np.column_stack([columns["x_m"], columns["y_m"]])
         lo, hi = bench_file.near_boxes(task.world, path, radius + bench_file.REACH, high[2] + 0.2)
     return robot, urdf, columns, lo, hi

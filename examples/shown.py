@@ -27,7 +27,7 @@ from pathlib import Path
 
 import numpy as np
 
-from closed_loop_mujoco import END, PERIOD, TURN_END, build, disturbed, drive, measured, off_the_end, pose_of, prepare
+from closed_loop_mujoco import END, PERIOD, TURN_END, build, disturbed, drive, measured, off_the_end, pose_of, postures, prepare
 
 HOME = Path(__file__).resolve().parent.parent
 MISSIONS = "first,turtlebot3_burger,arch_bridges,barn_29_tolerance,site_tolerance"
@@ -48,8 +48,7 @@ class Watch:
         bend, heading = columns["omega_rad_s"][row] * tau / 2, columns["yaw_rad"][row]
         chord = columns["v_mps"][row] * tau * np.sinc(bend / np.pi)
         self.path = np.column_stack([columns["x_m"][row] + chord * np.cos(heading + bend), columns["y_m"][row] + chord * np.sin(heading + bend), heading + 2 * bend])
-        joints = {name: np.unique(column_of(columns, name).round(2)) for name in bench.robot.moving}
-        self.reach, self.room, self.bench, self.lateral, self.filled = bench.robot.extents(joints)[2], room, bench, 0.0, 0.0
+        self.reach, self.room, self.bench, self.lateral, self.filled = bench.robot.extents(postures(bench.robot, columns))[2], room, bench, 0.0, 0.0
 
     def __call__(self, path_time):
         near = self.path[max(0, int((path_time - BEHIND) * 100)):int((path_time + AHEAD) * 100) + 1]
@@ -61,10 +60,6 @@ class Watch:
         at = int(off.argmin())
         self.lateral = max(self.lateral, abs(dy[at] * math.cos(near[at, 2]) - dx[at] * math.sin(near[at, 2])))
         self.filled = max(self.filled, off[at] / self.room)
-
-
-def column_of(columns, joint):
-    return next(values for name, values in columns.items() if name.startswith(f"joint.{joint}.pos_"))
 
 
 def trajc(args, *words):
@@ -232,7 +227,7 @@ def main():
         tasks = [(args, mission, name, Path(work) / mission / str(k)) for mission in missions for k, name in enumerate(names)]
         for mission, name, own in pool.map(case, tasks):
             found.setdefault(mission, {})[name] = own
-            print(f"{mission:<20}{name:<20}" + " | ".join(cell(own[way]) for way in own) + "".join(f"  ({own[way]['note']})" for way in own if own[way]["note"]), flush=True)
+            print(f"{mission:<22}{name:<20}" + " | ".join(cell(own[way]) for way in own) + "".join(f"  ({own[way]['note']})" for way in own if own[way]["note"]), flush=True)
             last = own.get("feedback")
             fine &= last is None or last["end_m"] <= END and last["end_rad"] <= TURN_END and last["filled"] <= 1 and not last["contacts"] and last["state"] == "done"
         print("\n| robot | " + " | ".join(ways) + " |\n|---|" + "---|" * len(ways))
