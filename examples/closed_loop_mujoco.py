@@ -25,9 +25,19 @@ PERIOD, NOISE, TURN_NOISE, END, TURN_END = 0.05, 0.005, math.radians(0.5), 0.010
 
 
 def build(bench_file, *arguments):
-    """A bench whose castors have play where they stand on either side of the axle. They are the base's first shapes, balls without a name."""
-    bench = bench_file.Bench(*arguments)
+    """A bench whose castors have play where they stand on either side of the axle. They are the base's first shapes, balls without a name.
+    With arms, whose centre of mass wanders: castors half a track before and behind the axle, and steps that are implicit in the servos' damping."""
+    arms = len(arguments[0].moving) > 1
+    castors = bench_file.castors
+    if arms:
+        bench_file.castors = lambda robot, *_: ([], [[robot.track / 2, 0.0], [-robot.track / 2, 0.0]])
+    try:
+        bench = bench_file.Bench(*arguments)
+    finally:
+        bench_file.castors = castors
     model = bench.model
+    if arms:
+        model.opt.integrator = 3  # mjINT_IMPLICITFAST
     feet = [g for g in range(model.ngeom) if model.geom_bodyid[g] == bench.base and not model.geom(g).name]
     if len(feet) and model.geom_pos[feet, 0].max() > 0 > model.geom_pos[feet, 0].min():
         model.geom_pos[feet, 2] += PLAY
