@@ -9,6 +9,8 @@ mod alone;
 mod bad_input;
 #[path = "cli/bad_maps_and_robots.rs"]
 mod bad_maps_and_robots;
+#[path = "cli/calibrate.rs"]
+mod calibrate;
 #[path = "cli/chain.rs"]
 mod chain;
 #[path = "cli/check.rs"]

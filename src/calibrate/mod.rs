@@ -8,6 +8,7 @@
 //!
 //! What is not seen: slip that all motions share is taken for a smaller wheel, which is right as long as the floor stays the same.
 
+mod bag;
 mod log;
 mod rewrite;
 
@@ -15,6 +16,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::geom::{Pose2, wrap_angle};
 
+pub use bag::{BagError, Topics, read_mcap};
 pub use log::{Log, LogError, read_csv};
 pub use rewrite::{RewriteError, rewrite};
 

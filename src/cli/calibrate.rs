@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use super::output::write_file;
 use super::terminal::Terminal;
-use crate::calibrate::{self, Fit, PoseNoise, RewriteError};
+use crate::calibrate::{self, BagError, Fit, Log, PoseNoise, RewriteError, Topics};
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::inputs::{Disk, read_robot_files};
 use crate::mission::LimitsSpec;
-use crate::robot::{self, RobotInputs};
+use crate::robot::{self, DriveJoint, RobotInputs, RobotModel};
 
 /// Wheel radii and track width from a log of wheel angles and poses.
 ///
@@ -16,12 +16,13 @@ use crate::robot::{self, RobotInputs};
 /// difference between the wheels) under `tolerance`. All else in the file stays as it is.
 ///
 /// The log is CSV with the columns time_s, wheel_left_rad, wheel_right_rad, x_m, y_m, yaw_rad: angles of the wheels, not wrapped, and poses
-/// of the base, on one clock. A row may leave its pose or its wheels empty. missions/calibrate.yaml is a motion that shows all.
+/// of the base, on one clock. A row may leave its pose or its wheels empty. Or it is a ROS 2 bag (.mcap): wheel angles in /joint_states, poses
+/// in /odom or /tf, which must not be made of those angles. missions/calibrate.yaml is a motion that shows all.
 ///
 /// Exit 0: calibrated. 2: bad input, or a log that does not show radii and track.
 #[derive(Debug, clap::Args)]
 pub struct CalibrateArgs {
-    /// The log (.csv).
+    /// The log (.csv, .mcap).
     log: PathBuf,
     /// The robot.yaml that gets the calibration.
     #[arg(long, value_name = "ROBOT.yaml")]
@@ -29,6 +30,15 @@ pub struct CalibrateArgs {
     /// Print what would be written, and write nothing.
     #[arg(long)]
     dry_run: bool,
+    /// Bag: the topic with poses (Odometry, PoseStamped, PoseWithCovarianceStamped, TFMessage) [default: /odom or /tf, whichever is there].
+    #[arg(long, value_name = "TOPIC")]
+    poses: Option<String>,
+    /// Bag: the topic with wheel angles (JointState).
+    #[arg(long, value_name = "TOPIC", default_value = "/joint_states")]
+    wheels: String,
+    /// Bag: the frame in /tf that is the base [default: the URDF's root link, else base_footprint, else base_link].
+    #[arg(long, value_name = "FRAME")]
+    base_frame: Option<String>,
     /// Standard deviation of the poses' coordinates, in metres.
     #[arg(long, value_name = "M", default_value = "0.005", value_parser = positive)]
     noise_m: f64,
@@ -39,6 +49,9 @@ pub struct CalibrateArgs {
     #[arg(long)]
     json: bool,
 }
+
+/// Radii and track that differ by less from robot.yaml's do not differ: no real log is so good.
+const NOTHING: f64 = 1e-7;
 
 fn positive(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|v| (1e-9..=1e3).contains(v)).ok_or_else(|| "expected a number above 0".to_owned())
@@ -51,20 +64,18 @@ fn positive(text: &str) -> Result<f64, String> {
 pub fn calibrate(args: &CalibrateArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics> {
     let mut disk = Disk::default();
     let name = args.log.display().to_string();
-    let text = disk.text(&args.log, None)?.text;
-    let log = calibrate::read_csv(&text)
-        .map_err(|error| Diagnostics::from(Diagnostic::error("calibrate/log", error).file(&name)))?;
     let (spec, yaml, urdf) = read_robot_files(&args.robot, &disk, None)?;
     let Some(yaml) = yaml else {
         let fault = Diagnostic::error("calibrate/urdf", format!("`{}` is a URDF", args.robot.display()));
         return Err(fault.hint("write a robot.yaml for it: trajc robot init FILE.urdf --out robot.yaml").into());
     };
-    let model = robot::parse(RobotInputs {
+    let (model, drive) = robot::parse_with_drive(RobotInputs {
         spec: &spec,
         urdf: (&urdf.name, &urdf.text),
         files: &mut disk,
         overrides: &LimitsSpec::default(),
     })?;
+    let log = read_log(args, &disk, &model, &drive)?;
     let guess = [model.wheel_radius, model.wheel_radius, model.track_width];
     let noise = PoseNoise { metres: args.noise_m, radians: args.noise_rad };
     let fit = calibrate::fit(&log, guess, noise).map_err(|error| {
@@ -79,6 +90,9 @@ pub fn calibrate(args: &CalibrateArgs, terminal: &mut Terminal) -> Result<u8, Di
     })?;
     let text = if args.json { json(&fit, guess) } else { readable(&fit, guess) };
     terminal.print(&text);
+    if fit.geometry.iter().zip(guess).all(|(new, old)| (new / old - 1.0).abs() < NOTHING) {
+        terminal.remark("the log agrees with robot.yaml to rounding: are its poses made of the wheels' angles?\n");
+    }
     if !args.dry_run {
         write_file(&args.robot, new.as_bytes())?;
         terminal.remark(&format!("{}: written\n", args.robot.display()));
@@ -89,6 +103,28 @@ pub fn calibrate(args: &CalibrateArgs, terminal: &mut Terminal) -> Result<u8, Di
         terminal.print(&format!("would write into {}:\n{changed}", args.robot.display()));
     }
     Ok(0)
+}
+
+/// The log, by its file name's ending.
+fn read_log(
+    args: &CalibrateArgs,
+    disk: &Disk,
+    model: &RobotModel,
+    drive: &[Vec<DriveJoint>; 2],
+) -> Result<Log, Diagnostics> {
+    let name = args.log.display().to_string();
+    let fault = |text: String| Diagnostic::error("calibrate/log", text).file(&name);
+    let is_bag = args.log.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"));
+    if !is_bag {
+        let text = disk.text(&args.log, None)?.text;
+        return calibrate::read_csv(&text).map_err(|error| fault(error.to_string()).into());
+    }
+    let bytes = disk.binary(&args.log, None)?;
+    let topics = Topics { wheels: &args.wheels, poses: args.poses.as_deref(), base_frame: args.base_frame.as_deref() };
+    calibrate::read_mcap(&bytes, model, drive, topics).map_err(|error: BagError| {
+        let fault = fault(error.to_string());
+        error.hint().into_iter().fold(fault, |fault, hint| fault.hint(hint)).into()
+    })
 }
 
 fn readable(fit: &Fit, guess: [f64; 3]) -> String {

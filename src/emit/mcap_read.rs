@@ -181,6 +181,29 @@ impl From<McapError> for McapReadError {
     }
 }
 
+/// An MCAP file of any content, such as a ROS 2 bag.
+pub struct Recording(Contents);
+
+impl Recording {
+    /// Reads all records and checks every checksum.
+    ///
+    /// # Errors
+    /// No MCAP, cut short, damaged, or larger than memory.
+    pub fn read(bytes: &[u8]) -> Result<Self, McapReadError> {
+        Contents::read(bytes).map(Self)
+    }
+
+    /// What is in it, in the order of its channels.
+    pub fn topics(&self) -> Vec<Topic> {
+        self.0.topics()
+    }
+
+    /// Log time (ns) and bytes of a topic's messages, in file order; of each of its channels if there are several.
+    pub fn messages<'a>(&'a self, topic: &'a str) -> impl Iterator<Item = (u64, &'a [u8])> {
+        self.0.all_messages(topic).map(|(stamp, bytes)| (*stamp, bytes.as_slice()))
+    }
+}
+
 /// Reads a command file. `name` is its path as the user knows it.
 ///
 /// # Errors

@@ -253,6 +253,34 @@ pub fn parse_with_findings(inputs: RobotInputs<'_>) -> Result<(RobotModel, Vec<F
     Ok((made.robot, findings))
 }
 
+/// The joint of a driving wheel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DriveJoint {
+    /// Its name in the URDF.
+    pub name: String,
+    /// 1 where its angle grows as the robot drives forward, -1 where it shrinks: its axis points to the right.
+    pub forward: f64,
+}
+
+/// Reads a robot, and names the joints of its left and its right driving wheels.
+///
+/// # Errors
+/// As [`parse`].
+pub fn parse_with_drive(inputs: RobotInputs<'_>) -> Result<(RobotModel, [Vec<DriveJoint>; 2]), Diagnostics> {
+    let Assembled { urdf, tree, wheels, roles, robot, .. } = assemble(inputs)?;
+    let poses = tree.link_poses(&urdf, |joint| roles.at_zero(joint));
+    let side = |joints: &[usize]| {
+        let of = |joint: &usize| {
+            let axis = drive::Axle::of(&urdf, &tree, &poses, *joint).axis;
+            let forward = (robot.base_from_root.rotation * axis).y.signum();
+            DriveJoint { name: urdf.robot.joints[*joint].name.clone(), forward }
+        };
+        joints.iter().map(of).collect()
+    };
+    let sides = [side(&wheels.left), side(&wheels.right)];
+    Ok((robot, sides))
+}
+
 /// A robot and what it was made from.
 struct Assembled {
     urdf: urdf::Urdf,

@@ -110,6 +110,12 @@ impl Contents {
         channel.and_then(|id| self.messages.get(id)).map_or(&[], Vec::as_slice)
     }
 
+    /// The same of all channels with that topic, one after the other: a bag has one for each kind of publisher.
+    pub fn all_messages<'a>(&'a self, topic: &'a str) -> impl Iterator<Item = &'a (u64, Vec<u8>)> {
+        let channels = self.channels.iter().filter(move |(_, (name, _))| name == topic);
+        channels.filter_map(|(id, _)| self.messages.get(id)).flatten()
+    }
+
     /// What is in the file, in the order of its channels.
     pub fn topics(&self) -> Vec<Topic> {
         let of = |(id, (name, schema)): (&u16, &(String, u16))| Topic {
