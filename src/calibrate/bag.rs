@@ -293,3 +293,6 @@ fn transformed(
     }
     Ok(poses)
 }
+
+#[cfg(test)]
+mod tests;
