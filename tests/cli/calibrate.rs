@@ -117,7 +117,7 @@ fn tf_bag() -> Vec<u8> {
         let seen = origin.isometry().inverse() * pose.isometry();
         let own = Pose2::new(seen.translation.x, seen.translation.y, pose.yaw - origin.yaw);
         let mut out = Vec::new();
-        if (time / STEP).round() as u64 % 10 == 0 {
+        if ((time / STEP).round() as u64).is_multiple_of(10) {
             out.push(("/tf", "tf2_msgs/msg/TFMessage", transform(time, ["map", "odom"], origin)));
         }
         out.push(("/tf", "tf2_msgs/msg/TFMessage", transform(time, ["odom", "base_footprint"], own)));
