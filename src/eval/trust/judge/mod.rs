@@ -61,13 +61,7 @@ fn motion(case: &Case) -> Motion<'_> {
 
 /// Corners of a cell's cube.
 fn cube(map: &VoxelMap, cell: [usize; 3]) -> [[f64; 3]; 2] {
-    let mut corners = [[0.0; 3]; 2];
-    for axis in 0..3 {
-        for side in 0..2 {
-            corners[side][axis] = map.origin[axis] + map.resolution * (cell[axis] + side) as f64;
-        }
-    }
-    corners
+    [0, 1].map(|side| std::array::from_fn(|axis| map.origin[axis] + map.resolution * (cell[axis] + side) as f64))
 }
 
 fn things(map: &VoxelMap) -> Vec<Thing> {
