@@ -22,6 +22,7 @@ pub(super) fn plan(
     map: &Place,
     compile: &CompileOptions,
 ) -> Result<Made, Diagnostics> {
+    map.has_room()?;
     if !finish.mission.via.is_empty() {
         return stops::plan(run, finish, map, compile);
     }

@@ -91,21 +91,24 @@ fn a_zone_is_driven_slowly_and_that_is_proven() {
         sandbox.edit("missions/a.yaml", "clearance_m: 0.05", &format!("clearance_m: 0.05\ntime_law: {law}"));
         let run = sandbox.run(&["compile", "missions/a.yaml"]).expect(0);
         assert!(
-            run.stdout.contains("\n  slow zones  0.1") && run.stdout.contains("/0.15 m/s, not entered\n"),
+            run.stdout.contains("\n  slow zones  0.") && run.stdout.contains("/0.15 m/s, not entered\n"),
             "{}",
             run.stdout
         );
         let report: Value = serde_json::from_slice(&sandbox.read("out/a/report.json")).expect("JSON");
         let proven = &report["certificate"]["speed_zones"];
         let peak = proven[0]["peak_mps"].as_f64().expect("a number");
-        assert!(peak <= 0.15 && peak > 0.1, "{law}: {peak}");
+        // Laws that cannot slow down locally slow the whole leg, and some more than they need.
+        assert!(peak <= 0.15 && peak > if law == "auto" { 0.1 } else { 0.02 }, "{law}: {peak}");
         assert!(proven[1].get("peak_mps").is_none());
         let rows = rows(&sandbox, &["x_m", "v_mps"]);
         let inside = rows.iter().filter(|row| (1.6..=2.4).contains(&row[0])).map(|row| row[1]);
         assert!(inside.fold(0.0, f64::max) <= peak);
         if law == "auto" {
             assert!(rows.iter().any(|row| row[1] > 0.25), "fast elsewhere");
-            assert!(rows.len() > free + 20, "{} {free}", rows.len());
+            // The zone is 0.8 m wide; a row lasts 0.1 s.
+            let inside = rows.iter().filter(|row| (1.6..=2.4).contains(&row[0])).count();
+            assert!(inside >= 52 && rows.len() > free, "{inside} of {} rows, without it {free}", rows.len());
         }
         sandbox.run(&["check", "out/a/commands.mcap"]).expect(0);
         sandbox.edit("missions/a.yaml", &format!("\ntime_law: {law}"), "");

@@ -19,7 +19,7 @@
 //!
 //! **How much delay it bears.** About a straight line the loop of `across` and `heading` is `(2 zeta n s + n^2)/s^2` with `n^2 = b v^2`. Its gain
 //! is one at `n sqrt(2 zeta^2 + sqrt(4 zeta^4 + 1))` = 1.88 n for zeta = 0.9, where its phase has 73 degrees left: 0.68/n seconds of delay.
-//! The loops of `along`, and of `heading` in a spin, are `2 zeta n/s`: 0.87/n seconds. `n` is kept at or below [`FASTEST`], so every loop
+//! The loops of `along`, and of `heading` in a spin, are `2 zeta n/s`: 0.87/n seconds. `n` is kept at or below `FASTEST`, so every loop
 //! bears 0.37 s; what delays it is half of the time that a command is held, and latency while it is not known yet. [`longest_hold`] says for
 //! how long a command may be held.
 //!

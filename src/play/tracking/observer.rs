@@ -7,7 +7,7 @@
 //! those wheels; so noise of single poses is averaged, and a wheel that is larger than the model says is found within the first
 //! metres instead of being fought all the way. What wheels do not explain (slip, a push) is process noise that grows with the way.
 //!
-//! A pose far off is not believed at first: localisation jumps. [`BELIEVED`] of them in a row are.
+//! A pose far off is not believed at first: localisation jumps. `BELIEVED` of them in a row are.
 
 use std::collections::VecDeque;
 
