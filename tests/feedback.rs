@@ -88,7 +88,7 @@ fn over_stdio(
         .expect("the program starts");
     let (mut input, output) = (child.stdin.take().expect("piped"), child.stdout.take().expect("piped"));
     let (mut lines, mut base, mut noise) =
-        (BufReader::new(output).lines(), Base::new(&prepared.motion, fault), Noise(1));
+        (BufReader::new(output).lines(), Base::new(&prepared.motion, fault), Noise::new(1));
     let mut answers: Vec<serde_json::Value> = Vec::new();
     for k in 0..2000 {
         let time = 0.05 * k as f64;

@@ -158,18 +158,18 @@ static MAP: [Field; 8] = [
 ];
 
 /// How far from a place will do: less than this is what every end may miss its place by.
-const WITHIN: Shape = Shape::Number(Bounds::between(0.001, 1000.0, "m"));
+const WITHIN: Field = Field::optional(
+    "within_m",
+    Shape::Number(Bounds::between(0.001, 1000.0, "m")),
+    "0.3",
+    "anywhere so near to that point will do, metres; left out: at the point, but for 1 mm",
+);
 const ANY_YAW: Shape = Shape::AngleOr(Bounds::any("rad"), "any");
 
 pub(super) static GOAL: [Field; 5] = [
     Field::optional("x_m", METRES, "9.0", "metres, map frame"),
     Field::optional("y_m", METRES, "8.0", "metres, map frame"),
-    Field::optional(
-        "within_m",
-        WITHIN,
-        "0.3",
-        "anywhere so near to that point will do, metres; left out: at the point, but for 1 mm",
-    ),
+    WITHIN,
     Field::optional(
         "yaw",
         ANY_YAW,
@@ -211,12 +211,7 @@ static VIA: Shape = Shape::Table(&STOP);
 static STOP: [Field; 6] = [
     Field::required("x_m", METRES, "4.0", "metres, map frame"),
     Field::required("y_m", METRES, "4.0", "metres, map frame"),
-    Field::optional(
-        "within_m",
-        WITHIN,
-        "0.3",
-        "anywhere so near to that point will do, metres; left out: at the point, but for 1 mm",
-    ),
+    WITHIN,
     Field::optional(
         "yaw",
         ANY_YAW,

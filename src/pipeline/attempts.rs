@@ -101,7 +101,7 @@ impl Since {
 }
 
 /// How far robots may be off along commands from row `first` on.
-pub(super) fn slacks(
+fn slacks(
     commands: &CommandTable,
     robot: &RobotModel,
     task: &Task,
@@ -164,7 +164,7 @@ impl Attempts<'_> {
     }
 
     /// How far robots may be off along commands, by what they have behind them.
-    fn slacks(&self, commands: &CommandTable, task: &Task, tolerance: Tolerance) -> Option<Slacks> {
+    pub(super) fn slacks(&self, commands: &CommandTable, task: &Task, tolerance: Tolerance) -> Option<Slacks> {
         let robot = self.finish.robot;
         match self.since {
             None => slacks(commands, robot, task, tolerance, 0),

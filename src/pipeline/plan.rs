@@ -1,6 +1,6 @@
 //! Searching and optimising until something is certified.
 
-use super::attempts::{Attempts, Tries, slacks};
+use super::attempts::{Attempts, Tries};
 use super::{CompileOptions, Finish, Made, Place, Run, stops};
 use crate::certify::RefusalKind;
 use crate::diag::{Describe, Diagnostics};
@@ -31,10 +31,12 @@ pub(super) fn plan(
     note(run, &path, finish.robot);
     let task = |trajectory: &Trajectory| finish.task(trajectory);
     let attempts = Attempts { finish, map, compile, task: &task, since: None };
-    let (made, path) = motion(run, &attempts, path, &query)?;
-    note(run, &path, finish.robot);
+    let (made, other) = motion(run, &attempts, &path, &query)?;
+    if let Some(other) = other {
+        note(run, &other, finish.robot);
+    }
     if !made.certificate.holds()
-        && let Some(wider) = wider_route(run, finish, map, compile, &query, &made)
+        && let Some(wider) = wider_route(run, &attempts, &query, &made)
         && let Ok(again) = attempts.optimise(run, &wider)
         && again.certificate.holds()
     {
@@ -44,20 +46,20 @@ pub(super) fn plan(
     Ok(made)
 }
 
-/// The motion along a path, and the path. Where the first tries are refused it may be another path, by more postures: between those
-/// that were sampled something may have been in the way.
+/// The motion along a path. Where the first tries are refused it may be along another one, by more postures, which then is told:
+/// between those that were sampled something may have been in the way.
 pub(super) fn motion(
     run: &mut Run<'_>,
     attempts: &Attempts<'_>,
-    path: SearchPath,
+    path: &SearchPath,
     query: &Query,
-) -> Result<(Made, SearchPath), Diagnostics> {
+) -> Result<(Made, Option<SearchPath>), Diagnostics> {
     let Attempts { finish, map, compile, .. } = attempts;
     if !search::has_more_postures(finish.robot) {
-        return attempts.optimise(run, &path).map(|made| (made, path));
+        return attempts.optimise(run, path).map(|made| (made, None));
     }
-    let first = match attempts.run(run, &path, Tries::Soon) {
-        Ok(made) => return Ok((made, path)),
+    let first = match attempts.run(run, path, Tries::Soon) {
+        Ok(made) => return Ok((made, None)),
         Err(nearest) => nearest,
     };
     let field = map.field(compile.threads);
@@ -66,28 +68,22 @@ pub(super) fn motion(
     if let Some(other) = other
         && let Ok(made) = attempts.run(run, &other, Tries::Soon)
     {
-        return Ok((made, other));
+        return Ok((made, Some(other)));
     }
-    let made = match attempts.run(run, &path, Tries::Late) {
+    let made = match attempts.run(run, path, Tries::Late) {
         Ok(made) => made,
-        Err(nearest) => attempts.as_searched(run, &path, nearest.or(first))?,
+        Err(nearest) => attempts.as_searched(run, path, nearest.or(first))?,
     };
-    Ok((made, path))
+    Ok((made, None))
 }
 
 /// Another path, where that of a refused motion was too narrow for the tolerance alone: what the robot may be off there comes off every
 /// distance beside it. `None`: there is none, or the tolerance was not the reason.
-fn wider_route(
-    run: &mut Run<'_>,
-    finish: &Finish<'_>,
-    map: &Place,
-    compile: &CompileOptions,
-    query: &Query,
-    refused: &Made,
-) -> Option<SearchPath> {
+fn wider_route(run: &mut Run<'_>, attempts: &Attempts<'_>, query: &Query, refused: &Made) -> Option<SearchPath> {
+    let Attempts { finish, map, compile, .. } = attempts;
     let tolerance = finish.robot.tolerance.filter(|_| refused.only_the_tolerance_refuses())?;
     let task = finish.task(&refused.trajectory);
-    let slacks = slacks(&refused.commands, finish.robot, &task, tolerance, 0)?;
+    let slacks = attempts.slacks(&refused.commands, &task, tolerance)?;
     let field = map.field(compile.threads);
     run.stage("search", || {
         let lowered = field.lowered(|place| slacks.aside(place));

@@ -50,7 +50,9 @@ pub(super) fn plan(
             let about = if error.is_about_start() { index } else { index + 1 };
             of_stretch(finish, index, about, error.diagnostic().into())
         })?;
-        note(run, &joined_paths(route_so_far.clone(), &path), robot);
+        let before = route_so_far.take();
+        let mut so_far = joined_paths(before.clone(), &path);
+        note(run, &so_far, robot);
         let since = since(mission, &stretches);
         let task = |trajectory: &Trajectory| {
             let (start, start_joints) = start_of(trajectory);
@@ -58,10 +60,12 @@ pub(super) fn plan(
             Task { start, start_joints, goal, clearance: mission.clearance, reverse: mission.reverse }
         };
         let attempts = Attempts { finish, map, compile, task: &task, since: since.as_ref() };
-        let (made, path) =
-            motion(run, &attempts, path, &query).map_err(|faults| of_stretch(finish, index, index + 1, faults))?;
-        let so_far = joined_paths(route_so_far.take(), &path);
-        note(run, &so_far, robot);
+        let (made, other) =
+            motion(run, &attempts, &path, &query).map_err(|faults| of_stretch(finish, index, index + 1, faults))?;
+        if let Some(other) = &other {
+            so_far = joined_paths(before, other);
+            note(run, &so_far, robot);
+        }
         route_so_far = Some(so_far);
         if !made.certificate.holds() {
             let why = refused(&made.certificate, made.trajectory.source);
@@ -69,7 +73,7 @@ pub(super) fn plan(
             return Err(of_stretch(finish, index, index + 1, why.into()));
         }
         from = end_of(&made.commands, robot);
-        stretches.push((made, path.length() > 0.0));
+        stretches.push((made, other.unwrap_or(path).length() > 0.0));
     }
     let commands = joined_commands(mission, stretches.iter().map(|(made, _)| &made.commands)).map_err(|error| {
         let hint = "a shorter `dwell_s`, or a longer `sampling_time_s`";

@@ -1,9 +1,13 @@
 //! A robot whose wheels, track and latency are not the file's, and poses with noise: what closes the loop in tests and in
 //! `examples/closed_loop.rs`.
 
+#[path = "../../src/math/noise.rs"]
+mod noise;
+
 use std::collections::VecDeque;
 use std::path::Path;
 
+pub use noise::Noise;
 use trajc::geom::{Pose2, wrap_angle};
 use trajc::inputs::commands::{self, Places};
 use trajc::play::Motion;
@@ -67,24 +71,6 @@ pub fn prepare(path: &Path) -> Prepared {
     Prepared { tube: Tube::constant(clearance, 0.5, reach), robot, motion, limits, reverse }
 }
 
-/// Normal numbers from a seed (SplitMix64, Box and Muller).
-pub struct Noise(pub u64);
-
-impl Noise {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11).wrapping_add(1) as f64 * (1.0 / (1u64 << 53) as f64)
-    }
-
-    /// Of mean 0 and variance 1.
-    pub fn normal(&mut self) -> f64 {
-        (-2.0 * self.uniform().ln()).sqrt() * (std::f64::consts::TAU * self.uniform()).cos()
-    }
-}
-
 /// A simulated base.
 pub struct Base {
     pub pose: Pose2,
@@ -138,7 +124,7 @@ impl Base {
 pub fn closed(prepared: &Prepared, fault: Fault, options: Options, period: f64, seed: u64) -> Run {
     let Prepared { robot, motion, limits, tube, reverse } = prepared;
     let tracker = Tracker::new(motion, robot, limits, tube, Options { reverse: *reverse, ..options });
-    let (mut state, mut base, mut noise) = (tracker.begin(), Base::new(motion, fault), Noise(seed));
+    let (mut state, mut base, mut noise) = (tracker.begin(), Base::new(motion, fault), Noise::new(seed));
     let most_steps = ((3.0 * motion.table().duration() + 20.0) / period) as usize;
     let (mut commands, mut most, mut filled) = (Vec::new(), (0.0f64, 0.0f64), 0.0f64);
     for k in 0..most_steps {
