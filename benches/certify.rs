@@ -37,7 +37,7 @@ fn robot() -> RobotModel {
     };
     RobotModel {
         name: "bench".into(),
-        wheel_radius: 0.08,
+        wheel_radii: 0.08.into(),
         track_width: 0.32,
         root_link: "base".into(),
         base_from_root: Isometry3::identity(),
@@ -79,7 +79,7 @@ fn commands(robot: &RobotModel) -> (CommandTable, Task) {
     let mut table = CommandTable {
         sampling_time: 0.1,
         sampling: Sampling::Mean,
-        wheel_radius: robot.wheel_radius,
+        wheel_radii: robot.wheel_radii,
         track_width: robot.track_width,
         joints: vec![("blade".into(), false)],
         rows: Vec::new(),
@@ -92,8 +92,8 @@ fn commands(robot: &RobotModel) -> (CommandTable, Task) {
         };
         let difference = 0.5 * turn * robot.track_width;
         table.rows.push(CommandRow {
-            wheel_left: (speed - difference) / robot.wheel_radius,
-            wheel_right: (speed + difference) / robot.wheel_radius,
+            wheel_left: (speed - difference) / robot.wheel_radii.mean,
+            wheel_right: (speed + difference) / robot.wheel_radii.mean,
             joint_positions: vec![angle],
             joint_velocities: vec![rate],
             pose,

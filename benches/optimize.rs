@@ -41,7 +41,7 @@ fn robot() -> RobotModel {
     let limits = MotionLimits { speed: Some(1.0), acceleration: Some(1.0), jerk: Some(4.0) };
     RobotModel {
         name: "box".into(),
-        wheel_radius: 0.08,
+        wheel_radii: 0.08.into(),
         track_width: 0.32,
         root_link: "base_link".into(),
         base_from_root: Isometry3::identity(),

@@ -11,7 +11,7 @@ use trajc::trajectory::given;
 fn robot() -> RobotModel {
     RobotModel {
         name: "conv".into(),
-        wheel_radius: 0.1,
+        wheel_radii: 0.1.into(),
         track_width: 0.4,
         root_link: "base".into(),
         base_from_root: Default::default(),

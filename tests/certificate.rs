@@ -45,7 +45,7 @@ type State = (Pose2, Vec<f64>);
 /// The robot after `tau` seconds of row `row`'s held commands: an exact arc, joints at constant rates.
 fn driven(table: &CommandTable, row: usize, (pose, joints): &State, tau: f64) -> State {
     let held = &table.rows[row];
-    let [left, right] = [held.wheel_left, held.wheel_right].map(|w| w * table.wheel_radius * tau);
+    let [left, right] = [held.wheel_left, held.wheel_right].map(|w| w * table.wheel_radii.mean * tau);
     let (along, turn) = (0.5 * (left + right), (right - left) / table.track_width);
     let (x, y) = if turn.abs() < 1e-7 {
         (along * (pose.yaw + 0.5 * turn).cos(), along * (pose.yaw + 0.5 * turn).sin())

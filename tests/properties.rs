@@ -32,7 +32,7 @@ fn compile(text: &str) -> Outcome {
 fn replay(table: &CommandTable) -> Pose2 {
     let start = table.rows[0].pose;
     table.rows.iter().fold(start, |pose, row| {
-        let [left, right] = [row.wheel_left, row.wheel_right].map(|w| w * table.wheel_radius);
+        let [left, right] = [row.wheel_left, row.wheel_right].map(|w| w * table.wheel_radii.mean);
         pose.after_twist(0.5 * (left + right), (right - left) / table.track_width, table.sampling_time)
     })
 }
@@ -71,7 +71,7 @@ proptest! {
         prop_assert!(last.wheel_left == 0.0 && last.wheel_right == 0.0);
         for row in &table.rows {
             for wheel in [row.wheel_left, row.wheel_right] {
-                prop_assert!((wheel * table.wheel_radius).abs() <= 0.5 * (1.0 + 1e-9));
+                prop_assert!((wheel * table.wheel_radii.mean).abs() <= 0.5 * (1.0 + 1e-9));
             }
         }
     }

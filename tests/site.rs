@@ -33,7 +33,7 @@ fn under_the_tape(robot: &RobotModel, blade: f64) -> (CommandTable, Task) {
     let mut pose = start;
     let mut rows = Vec::new();
     for v in speeds {
-        let wheel = v / robot.wheel_radius;
+        let wheel = v / robot.wheel_radii.mean;
         rows.push(CommandRow {
             wheel_left: wheel,
             wheel_right: wheel,
@@ -46,7 +46,7 @@ fn under_the_tape(robot: &RobotModel, blade: f64) -> (CommandTable, Task) {
     let table = CommandTable {
         sampling_time: 0.1,
         sampling: Sampling::Mean,
-        wheel_radius: robot.wheel_radius,
+        wheel_radii: robot.wheel_radii,
         track_width: robot.track_width,
         joints: vec![("blade".into(), false)],
         rows,

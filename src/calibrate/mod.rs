@@ -72,7 +72,7 @@ pub struct Fit {
 pub struct Remaining {
     /// Of the radius of both wheels.
     pub wheel_radius: f64,
-    /// By which the right wheel may be larger than the left one: what was found, since a file has one radius for both, and its uncertainty.
+    /// Of how much the right wheel is larger than the left one.
     pub wheel_difference: f64,
     /// Of the track.
     pub track: f64,
@@ -105,7 +105,7 @@ impl Fit {
         let [radius, difference, track] = self.deviations();
         Remaining {
             wheel_radius: 3.0 * radius / self.radius(),
-            wheel_difference: self.difference().abs() + 3.0 * difference,
+            wheel_difference: 3.0 * difference,
             track: 3.0 * track / self.geometry[2],
         }
     }

@@ -15,23 +15,24 @@ pub enum RewriteError {
     NotATable(&'static str),
 }
 
-/// The text of robot.yaml with a calibration: `drive.wheel_radius_m`, `drive.track_width_m`, and what remains under `tolerance`.
+/// The text of robot.yaml with a calibration: `drive.wheel_radius_m`, `drive.wheel_difference`, `drive.track_width_m`, and what remains under `tolerance`.
 ///
 /// # Errors
 /// The text is no YAML, or `drive` or `tolerance` is no table.
 pub fn rewrite(name: &str, text: &str, fit: &Fit) -> Result<String, RewriteError> {
     let percent = |share: f64| format!("{}%", rounded(100.0 * share, 2));
-    let [radius, _, track] = fit.deviations();
+    let [radius, difference, track] = fit.deviations();
     let remaining = fit.remaining();
     // Digits that mean something: to a tenth of the standard deviation.
-    let length = |value: f64, deviation: f64| {
+    let decimal = |value: f64, deviation: f64| {
         let places = (1.0 - deviation.max(1e-9).log10()).ceil().clamp(3.0, 9.0) as usize;
         format!("{value:.places$}")
     };
     let values = [
         // New keys go before those that are there: the last one comes first.
-        ("drive", "track_width_m", length(fit.geometry[2], track)),
-        ("drive", "wheel_radius_m", length(fit.radius(), radius)),
+        ("drive", "track_width_m", decimal(fit.geometry[2], track)),
+        ("drive", "wheel_difference", format!("{}%", decimal(100.0 * fit.difference(), 100.0 * difference))),
+        ("drive", "wheel_radius_m", decimal(fit.radius(), radius)),
         ("tolerance", "track", percent(remaining.track)),
         ("tolerance", "wheel_difference", percent(remaining.wheel_difference)),
         ("tolerance", "wheel_radius", percent(remaining.wheel_radius)),
@@ -104,9 +105,9 @@ mod tests {
     #[test]
     fn values_are_replaced_or_added_and_nothing_else_changes() {
         let text = "# mine\nurdf: a.urdf   # as built\ndrive: {left: l, wheel_radius_m: 0.08,  right: r} # wheels\nlimits:\n  wheel: {speed_mps: 1}\n";
-        let expected = "# mine\nurdf: a.urdf   # as built\ndrive: {track_width_m: 0.32150, left: l, wheel_radius_m: 0.0802000,  right: r} # wheels\n\
+        let expected = "# mine\nurdf: a.urdf   # as built\ndrive: {wheel_difference: 0.249%, track_width_m: 0.32150, left: l, wheel_radius_m: 0.0802000,  right: r} # wheels\n\
                         limits:\n  wheel: {speed_mps: 1}\n\
-                        tolerance: {wheel_radius: 0.027%, wheel_difference: 0.31%, track: 0.19%}\n";
+                        tolerance: {wheel_radius: 0.027%, wheel_difference: 0.053%, track: 0.19%}\n";
         assert_eq!(written(text), expected);
     }
 
@@ -114,9 +115,12 @@ mod tests {
     fn blocks_and_files_without_the_tables_are_written_too() {
         let block = "drive:\n  # found\n  left: l\n  right: r\nurdf: a.urdf";
         let text = written(block);
-        assert!(text.starts_with("drive:\n  # found\n  wheel_radius_m: 0.0802000\n  track_width_m: 0.32150\n  left: l\n  right: r\nurdf: a.urdf\n"), "{text}");
+        assert!(text.starts_with("drive:\n  # found\n  wheel_radius_m: 0.0802000\n  wheel_difference: 0.249%\n  track_width_m: 0.32150\n  left: l\n  right: r\nurdf: a.urdf\n"), "{text}");
         let text = written("urdf: a.urdf\n");
-        assert!(text.contains("drive: {wheel_radius_m: 0.0802000, track_width_m: 0.32150}\n"), "{text}");
+        assert!(
+            text.contains("drive: {wheel_radius_m: 0.0802000, wheel_difference: 0.249%, track_width_m: 0.32150}\n"),
+            "{text}"
+        );
     }
 
     #[test]

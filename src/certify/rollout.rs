@@ -113,7 +113,7 @@ mod tests {
         let table = CommandTable {
             sampling_time: 0.5,
             sampling: Sampling::Mean,
-            wheel_radius: 0.1,
+            wheel_radii: 0.1.into(),
             track_width: 0.4,
             joints: vec![("arm".into(), false)],
             rows: vec![row(1.0, 3.0, 0.2), row(-1.0, 1.0, -0.6), row(0.0, 0.0, 0.0)],

@@ -30,7 +30,8 @@ pub(super) fn unreadable(table: &CommandTable, robot: &RobotModel, task: &Task) 
     fault(table.rows.is_empty(), &|| "the command table has no rows".into(), None);
     let positive = [
         ("sampling time", table.sampling_time),
-        ("wheel radius", table.wheel_radius),
+        ("left wheel's radius", table.wheel_radii.sides()[0]),
+        ("right wheel's radius", table.wheel_radii.sides()[1]),
         ("track width", table.track_width),
     ];
     for (what, value) in positive {
@@ -40,8 +41,10 @@ pub(super) fn unreadable(table: &CommandTable, robot: &RobotModel, task: &Task) 
             None,
         );
     }
+    let (own_radii, radii) = (table.wheel_radii.sides(), robot.wheel_radii.sides());
     for (what, own, robots) in [
-        ("wheel radius", table.wheel_radius, robot.wheel_radius),
+        ("left wheel's radius", own_radii[0], radii[0]),
+        ("right wheel's radius", own_radii[1], radii[1]),
         ("track width", table.track_width, robot.track_width),
     ] {
         fault(

@@ -76,7 +76,8 @@ pub fn calibrate(args: &CalibrateArgs, terminal: &mut Terminal) -> Result<u8, Di
         overrides: &LimitsSpec::default(),
     })?;
     let log = read_log(args, &disk, &model, &drive)?;
-    let guess = [model.wheel_radius, model.wheel_radius, model.track_width];
+    let [left, right] = model.wheel_radii.sides();
+    let guess = [left, right, model.track_width];
     let noise = PoseNoise { metres: args.noise_m, radians: args.noise_rad };
     let fit = calibrate::fit(&log, guess, noise).map_err(|error| {
         let hint = error.hint();

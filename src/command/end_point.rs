@@ -25,7 +25,7 @@ pub fn miss(table: &CommandTable, start: Pose2, end: Pose2) -> (f64, f64) {
 /// otherwise the table is left unchanged.
 pub fn close(table: &mut CommandTable, start: Pose2, end: Pose2, tolerance: f64) -> bool {
     let original: Vec<[f64; 2]> = table.rows.iter().map(|row| [row.wheel_left, row.wheel_right]).collect();
-    let (hold, track, radius) = (table.sampling_time, table.track_width, table.wheel_radius);
+    let (hold, track, radii) = (table.sampling_time, table.track_width, table.wheel_radii.sides());
     let twists: Vec<(f64, f64)> = (0..table.rows.len()).map(|k| table.twist(k)).collect();
 
     let (_, angle) = miss(table, start, end);
@@ -37,8 +37,8 @@ pub fn close(table: &mut CommandTable, start: Pose2, end: Pose2, tolerance: f64)
         }
         for (row, (_, omega)) in table.rows.iter_mut().zip(&twists) {
             let rim = 0.5 * track * share * omega * omega;
-            row.wheel_left -= rim / radius;
-            row.wheel_right += rim / radius;
+            row.wheel_left -= rim / radii[0];
+            row.wheel_right += rim / radii[1];
         }
     }
 
@@ -68,8 +68,8 @@ pub fn close(table: &mut CommandTable, start: Pose2, end: Pose2, tolerance: f64)
         let multiplier = least_norm(gram, gap);
         for ((row, d), (v, _)) in table.rows.iter_mut().zip(&directions).zip(&twists) {
             let rim = v * v * (multiplier[0] * d[0] + multiplier[1] * d[1]);
-            row.wheel_left += rim / radius;
-            row.wheel_right += rim / radius;
+            row.wheel_left += rim / radii[0];
+            row.wheel_right += rim / radii[1];
         }
     }
     let gentle = (0..table.rows.len()).all(|k| {

@@ -9,6 +9,7 @@ mod tracked;
 
 use crate::geom::Pose2;
 use crate::mission::Sampling;
+use crate::robot::WheelRadii;
 
 pub use error::CommandError;
 pub use sample::{MOST_ROWS, sample, sample_uncorrected};
@@ -21,8 +22,8 @@ pub struct CommandTable {
     pub sampling_time: f64,
     /// How wheel speeds were sampled.
     pub sampling: Sampling,
-    /// m.
-    pub wheel_radius: f64,
+    /// Of the driving wheels.
+    pub wheel_radii: WheelRadii,
     /// m.
     pub track_width: f64,
     /// Names of the moving joints with a column, and whether prismatic.
@@ -65,7 +66,8 @@ impl CommandTable {
 
     /// Rim speeds (left, right) held in row k, m/s.
     pub fn rim_speeds(&self, k: usize) -> (f64, f64) {
-        (self.wheel_radius * self.rows[k].wheel_left, self.wheel_radius * self.rows[k].wheel_right)
+        let ([left, right], row) = (self.wheel_radii.sides(), &self.rows[k]);
+        (left * row.wheel_left, right * row.wheel_right)
     }
 }
 

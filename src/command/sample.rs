@@ -160,6 +160,7 @@ fn uncorrected(profile: &MotionProfile, robot: &RobotModel, options: &SampleOpti
     let hold = options.sampling_time;
     let profile = profile.slowed_to(intervals as f64 * hold);
     let joints = robot.joints.len();
+    let radii = robot.wheel_radii.sides();
     let mut positions = profile.joints(0.0);
     let mut means = profile.mean_speeds(intervals);
     means.push(vec![0.0; 2 + joints]);
@@ -173,8 +174,8 @@ fn uncorrected(profile: &MotionProfile, robot: &RobotModel, options: &SampleOpti
                 _ => mean.clone(),
             };
             let row = CommandRow {
-                wheel_left: rims[0] / robot.wheel_radius,
-                wheel_right: rims[1] / robot.wheel_radius,
+                wheel_left: rims[0] / radii[0],
+                wheel_right: rims[1] / radii[1],
                 joint_positions: positions.clone(),
                 joint_velocities: mean[2..].to_vec(),
                 pose: profile.pose(t),
@@ -187,7 +188,7 @@ fn uncorrected(profile: &MotionProfile, robot: &RobotModel, options: &SampleOpti
     CommandTable {
         sampling_time: hold,
         sampling: options.sampling,
-        wheel_radius: robot.wheel_radius,
+        wheel_radii: robot.wheel_radii,
         track_width: robot.track_width,
         joints: robot.joints.iter().map(|joint| (joint.name.clone(), joint.prismatic)).collect(),
         rows,

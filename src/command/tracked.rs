@@ -36,6 +36,7 @@ const END: f64 = 1e4;
 pub(super) fn correct(table: &mut CommandTable, robot: &RobotModel, closeness: f64) -> Option<f64> {
     let last = table.rows.len().checked_sub(1)?;
     let start = table.rows[0].pose;
+    let radii = table.wheel_radii.sides();
     let base: Vec<[f64; 2]> = (0..last).map(|k| rims(table, k)).collect();
     let mut off = replayed(table, start);
     let before = farthest(&off);
@@ -53,8 +54,8 @@ pub(super) fn correct(table: &mut CommandTable, robot: &RobotModel, closeness: f
         let turn = table.sampling_time / table.track_width;
         corrections = Problem { rows: &rows, turn, position, end: (end, multipliers), rest }.solve()?;
         for (row, (base, more)) in table.rows.iter_mut().zip(base.iter().zip(&corrections)) {
-            row.wheel_left = (base[0] + more[0]) / table.wheel_radius;
-            row.wheel_right = (base[1] + more[1]) / table.wheel_radius;
+            row.wheel_left = (base[0] + more[0]) / radii[0];
+            row.wheel_right = (base[1] + more[1]) / radii[1];
         }
         off = replayed(table, start);
         let miss = off[last];

@@ -8,6 +8,7 @@ use crate::command::{CommandRow, CommandTable};
 use crate::diag::{Diagnostic, Diagnostics, Source, Span, nearest};
 use crate::geom::Pose2;
 use crate::report::names;
+use crate::robot::{LARGEST_DIFFERENCE, WheelRadii};
 
 /// Rows may be off `k * sampling_time` by this, s: rounding of other writers.
 const TIME_TOLERANCE: f64 = 1e-9;
@@ -19,8 +20,8 @@ const FAULTS: usize = 12;
 /// The columns that are no joint's.
 const FIXED: [&str; 8] =
     ["time_s", "wheel_left_rad_s", "wheel_right_rad_s", "v_mps", "omega_rad_s", "x_m", "y_m", "yaw_rad"];
-/// The keys of the head; `map` may be missing.
-const KEYS: [&str; 9] = [
+/// The keys of the head, and those of them that may be missing.
+const KEYS: [&str; 10] = [
     "format",
     "mission",
     "robot",
@@ -28,9 +29,11 @@ const KEYS: [&str; 9] = [
     "sampling_time_s",
     "sampling",
     "wheel_radius_m",
+    "wheel_difference",
     "track_width_m",
     "inputs_blake3",
 ];
+const OPTIONAL: [&str; 2] = ["map", "wheel_difference"];
 
 /// A command file's table and head. `name` is the file's path as the user knows it.
 ///
@@ -87,7 +90,7 @@ struct Head {
     header: CsvHeader,
     sampling_time: f64,
     sampling: crate::mission::Sampling,
-    wheel_radius: f64,
+    wheel_radii: WheelRadii,
     track_width: f64,
 }
 
@@ -139,7 +142,7 @@ impl Reader<'_> {
         let mut table = CommandTable {
             sampling_time: head.sampling_time,
             sampling: head.sampling,
-            wheel_radius: head.wheel_radius,
+            wheel_radii: head.wheel_radii,
             track_width: head.track_width,
             joints: columns.joints.iter().map(|j| (j.name.clone(), j.prismatic)).collect(),
             rows: Vec::with_capacity(self.lines.len() - notes - 1),
@@ -202,7 +205,7 @@ impl Reader<'_> {
             }
             Some(_) => {}
         }
-        for key in KEYS.into_iter().filter(|key| *key != "map") {
+        for key in KEYS.into_iter().filter(|key| !OPTIONAL.contains(key)) {
             if !found.iter().any(|(k, ..)| *k == key) {
                 self.fault("commands/head", format!("the head has no `# {key}: …`"), top.clone());
             }
@@ -212,6 +215,17 @@ impl Reader<'_> {
         let text = |key: &str| get(key).map(|(value, _)| value);
         let sampling_time = get("sampling_time_s").and_then(|found| self.positive("sampling_time_s", found));
         let wheel_radius = get("wheel_radius_m").and_then(|found| self.positive("wheel_radius_m", found));
+        let wheel_difference = match get("wheel_difference") {
+            Some((value, range)) => {
+                let share = value.parse::<f64>().ok().filter(|share| share.abs() <= LARGEST_DIFFERENCE);
+                if share.is_none() {
+                    let message = format!("wheel_difference is `{value}`, must be a share from -0.1 to 0.1");
+                    self.fault("commands/head", message, range);
+                }
+                share
+            }
+            None => Some(0.0),
+        };
         let track_width = get("track_width_m").and_then(|found| self.positive("track_width_m", found));
         let sampling = get("sampling").and_then(|(value, range)| {
             let sampling = names::parse_sampling(&value);
@@ -230,7 +244,7 @@ impl Reader<'_> {
             },
             sampling_time: sampling_time?,
             sampling: sampling?,
-            wheel_radius: wheel_radius?,
+            wheel_radii: WheelRadii { mean: wheel_radius?, difference: wheel_difference? },
             track_width: track_width?,
         })
     }

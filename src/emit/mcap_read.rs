@@ -16,6 +16,7 @@ use crate::diag::{Describe, Diagnostic, Diagnostics};
 use crate::geom::{Pose2, unwrap_near};
 use crate::memory;
 use crate::report::names;
+use crate::robot::{LARGEST_DIFFERENCE, WheelRadii};
 use container::Contents;
 use message::{MessageError, joint_names, joint_state, pose, skip_header, twist, wheel_speeds};
 
@@ -285,7 +286,15 @@ impl Head<'_> {
         Ok(CommandTable {
             sampling_time: self.positive("sampling_time_s")?,
             sampling: names::parse_sampling(self.text("sampling")?).ok_or_else(|| self.fault("sampling"))?,
-            wheel_radius: self.positive("wheel_radius_m")?,
+            wheel_radii: WheelRadii {
+                mean: self.positive("wheel_radius_m")?,
+                difference: if self.values.contains_key("wheel_difference") {
+                    let share = Some(self.number("wheel_difference")?);
+                    share.filter(|s| s.abs() <= LARGEST_DIFFERENCE).ok_or_else(|| self.fault("wheel_difference"))?
+                } else {
+                    0.0
+                },
+            },
             track_width: self.positive("track_width_m")?,
             joints: Vec::new(),
             rows: Vec::new(),

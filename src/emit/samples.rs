@@ -10,7 +10,7 @@ pub fn table(rows: usize, joints: &[(&str, bool)]) -> CommandTable {
     let mut table = CommandTable {
         sampling_time: 0.1,
         sampling: Sampling::Mean,
-        wheel_radius: 0.08,
+        wheel_radii: 0.08.into(),
         track_width: 0.32,
         joints: joints.iter().map(|(name, prismatic)| ((*name).to_string(), *prismatic)).collect(),
         rows: Vec::new(),

@@ -83,7 +83,7 @@ mod tests {
         let table = CommandTable {
             sampling_time: 0.1,
             sampling: Sampling::Mean,
-            wheel_radius: 0.08,
+            wheel_radii: 0.08.into(),
             track_width: 0.32,
             joints: vec![],
             rows: [0.1, 0.3, 0.0].map(row).into(),

@@ -202,9 +202,9 @@ impl Sampling {
 pub enum TimeLaw {
     /// The fastest that keeps every limit.
     Auto,
-    /// Least time under all limits (a later issue).
+    /// Least time under all limits.
     Optimal,
-    /// Convolution profile in the wheel metric (a later issue).
+    /// Convolution profile in the wheel metric.
     Wheel,
     /// `v' = v_max / (1 + D/2 max|curvature|)`.
     FixedPoint,

@@ -159,7 +159,7 @@ pub fn robot(joints: usize) -> RobotModel {
     }
     RobotModel {
         name: "test".into(),
-        wheel_radius: 0.08,
+        wheel_radii: 0.08.into(),
         track_width: 0.32,
         root_link: "base_link".into(),
         base_from_root: Isometry3::identity(),

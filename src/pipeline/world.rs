@@ -57,8 +57,10 @@ fn end_of(file: &StartFile, robot: &RobotModel, mission: &Mission) -> Result<Pos
         let message = format!("`{name}` moves the joints [{}], the robot has [{}]", theirs.join(", "), own.join(", "));
         return Err(fault("mission/start-robot", message, same));
     }
+    let ([left, right], [own_left, own_right]) = (table.wheel_radii.sides(), robot.wheel_radii.sides());
     let wheels = [
-        ("wheel radius", table.wheel_radius, robot.wheel_radius),
+        ("left wheel radius", left, own_left),
+        ("right wheel radius", right, own_right),
         ("track width", table.track_width, robot.track_width),
     ];
     if let Some((what, theirs, own)) = wheels.into_iter().find(|(_, theirs, own)| (theirs - own).abs() > SAME_WHEELS) {

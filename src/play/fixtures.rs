@@ -18,7 +18,7 @@ pub fn table(speeds: &[Vec<f64>], hold: f64) -> CommandTable {
     let mut table = CommandTable {
         sampling_time: hold,
         sampling: Sampling::Mean,
-        wheel_radius: 0.1,
+        wheel_radii: 0.1.into(),
         track_width: 0.4,
         joints: (0..joints).map(|j| (format!("joint{j}"), false)).collect(),
         rows: Vec::new(),
@@ -70,7 +70,7 @@ pub fn tight_robot(table: &CommandTable) -> RobotModel {
         jerk: Some(jerk),
     };
     let (left, right) = (peaks(0), peaks(1));
-    let wheel = [0, 1, 2].map(|k| table.wheel_radius * left[k].max(right[k]).max(1e-6));
+    let wheel = [0, 1, 2].map(|k| table.wheel_radii.mean * left[k].max(right[k]).max(1e-6));
     let joints = table.joints.iter().enumerate().map(|(j, (name, prismatic))| MovingJoint {
         name: name.clone(),
         prismatic: *prismatic,

@@ -36,7 +36,7 @@ impl Limits {
                 (given[order] / radius).max(peaks[order]) * hold.powi(order as i32) * (1.0 + 0.5 * ROUNDING)
             })
         };
-        let wheels = [0, 1].map(|side| of(side, &robot.wheel, motion.table().wheel_radius));
+        let wheels = [0, 1].map(|side| of(side, &robot.wheel, motion.table().wheel_radii.sides()[side]));
         let joints = robot.joints.iter().enumerate().map(|(j, joint)| of(2 + j, &joint.limits, 1.0));
         Self(wheels.into_iter().chain(joints).collect())
     }

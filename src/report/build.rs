@@ -136,7 +136,8 @@ impl From<&RobotModel> for RobotPart {
     fn from(robot: &RobotModel) -> Self {
         Self {
             name: robot.name.clone(),
-            wheel_radius_m: robot.wheel_radius,
+            wheel_radius_m: robot.wheel_radii.mean,
+            wheel_difference: Some(robot.wheel_radii.difference).filter(|share| *share != 0.0),
             track_width_m: robot.track_width,
             joints: robot.joints.iter().map(JointPart::from).collect(),
             shapes: robot.shapes.len(),

@@ -117,8 +117,11 @@ pub struct InputFile {
 pub struct RobotPart {
     /// Its name.
     pub name: String,
-    /// m.
+    /// Mean of both sides, m.
     pub wheel_radius_m: f64,
+    /// By how much the right wheel is larger than the left one, as a share of the mean; absent: not at all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wheel_difference: Option<f64>,
     /// Distance between the driving wheels, m.
     pub track_width_m: f64,
     /// The moving joints.

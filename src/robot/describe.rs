@@ -15,7 +15,11 @@ impl RobotModel {
     fn describe_into(&self, out: &mut String) -> std::fmt::Result {
         let rate = if self.joints.len() == 1 { "joint moves" } else { "joints move" };
         writeln!(out, "robot {}: {} {rate}", self.name, self.joints.len())?;
-        writeln!(out, "wheel radius {:.4} m, track width {:.4} m", self.wheel_radius, self.track_width)?;
+        write!(out, "wheel radius {:.4} m, ", self.wheel_radii.mean)?;
+        if self.wheel_radii.difference != 0.0 {
+            write!(out, "the right wheel {:+.3} % larger, ", 100.0 * self.wheel_radii.difference)?;
+        }
+        writeln!(out, "track width {:.4} m", self.track_width)?;
         let ([x, y, z], (roll, pitch, yaw)) =
             (self.base_from_root.translation.vector.into(), self.base_from_root.rotation.euler_angles());
         let degrees = [roll, pitch, yaw].map(|a| a.to_degrees() + 0.0);

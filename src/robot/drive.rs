@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use urdf_rs::Geometry;
 
+use super::WheelRadii;
 use super::spec::RobotSpec;
 use super::tree::{self, Tree};
 use super::urdf::Urdf;
@@ -16,7 +17,7 @@ const RADIUS_TOLERANCE: f64 = 1e-4;
 
 /// What the wheels say about the robot.
 pub(super) struct Drive {
-    pub wheel_radius: f64,
+    pub wheel_radii: WheelRadii,
     pub track_width: f64,
     pub base_from_root: Isometry3<f64>,
 }
@@ -99,18 +100,19 @@ pub(super) fn drive(
         Some(given) => given.value,
         None => distance,
     };
-    let wheel_radius = wheel_radius(spec, urdf, tree, wheels, &mut faults);
-    let Some(wheel_radius) = wheel_radius.filter(|_| faults.is_empty()) else {
+    let radius = wheel_radius(spec, urdf, tree, wheels, &mut faults);
+    let Some(radius) = radius.filter(|_| faults.is_empty()) else {
         return Err(Diagnostics(faults));
     };
 
     let y = Vector3::new(across.x, across.y, 0.0).normalize();
     let axes = Matrix3::from_columns(&[Vector3::new(y.y, -y.x, 0.0), y, Vector3::z()]);
     let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
-    let floor = (mean(&left) + mean(&right)) / 2.0 - Vector3::new(0.0, 0.0, wheel_radius);
+    let floor = (mean(&left) + mean(&right)) / 2.0 - Vector3::new(0.0, 0.0, radius);
     let root_from_base = Isometry3::from_parts(Translation3::from(floor), turn);
     debug_assert!((root_from_base * Point3::origin() - Point3::from(floor)).norm() < 1e-9);
-    Ok(Drive { wheel_radius, track_width, base_from_root: root_from_base.inverse() })
+    let wheel_radii = WheelRadii { mean: radius, difference: spec.wheel_difference.unwrap_or(0.0) };
+    Ok(Drive { wheel_radii, track_width, base_from_root: root_from_base.inverse() })
 }
 
 /// The radius of a wheel's collision cylinder or sphere, m.
@@ -121,7 +123,7 @@ pub(super) fn round_radius(urdf: &Urdf, tree: &Tree, joint: usize) -> Option<f64
     })
 }
 
-/// The radius given in robot.yaml, else that of the wheels' cylinders and spheres; they must agree in both cases.
+/// The mean radius given in robot.yaml, else that of the wheels' cylinders and spheres, which must agree.
 fn wheel_radius(
     spec: &RobotSpec,
     urdf: &Urdf,
@@ -139,7 +141,7 @@ fn wheel_radius(
                 name(first),
                 name(*j)
             );
-            let hint = "a differential drive needs equal wheels; if only the model is wrong, give drive.wheel_radius_m in robot.yaml";
+            let hint = "give the mean as drive.wheel_radius_m in robot.yaml, and drive.wheel_difference if the real wheels differ too";
             faults.push(Diagnostic::error("robot/unequal-wheels", message).at(&urdf.joint_spans[*j]).hint(hint));
         }
     }

@@ -167,7 +167,7 @@ impl Page {
             None => "of the wheels' cylinders".into(),
             Some(_) => format!("a guess: the wheels have no cylinder. {UNKNOWN}"),
         };
-        self.line(&format!("  wheel_radius_m: {}     # {source}", made.robot.wheel_radius));
+        self.line(&format!("  wheel_radius_m: {}     # {source}", made.robot.wheel_radii.mean));
         let source = match made.facts().track_of_shapes() {
             Some(_) => "between the middles of the wheels' cylinders",
             None => "between the wheels' joints",

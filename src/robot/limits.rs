@@ -64,8 +64,12 @@ impl Overrides<'_> {
     pub fn wheel(&mut self, urdf: &Urdf, wheels: &Wheels, drive: &Drive) -> MotionLimits {
         let layers = [&self.spec.limits.wheel, &self.mission.wheel];
         let mut limits = self.motion("wheel", ["speed_mps", "acceleration_mps2", "jerk_mps3"], layers, None);
-        let slowest = wheels.all().filter_map(|j| velocity(&urdf.robot.joints[j])).reduce(f64::min);
-        limits.speed = limits.speed.or(slowest.map(|rate| rate * drive.wheel_radius));
+        let of = |side: &[usize], radius: f64| {
+            side.iter().filter_map(|j| velocity(&urdf.robot.joints[*j])).map(|rate| rate * radius).reduce(f64::min)
+        };
+        let [left, right] = drive.wheel_radii.sides();
+        let slowest = of(&wheels.left, left).into_iter().chain(of(&wheels.right, right)).reduce(f64::min);
+        limits.speed = limits.speed.or(slowest);
         limits
     }
 

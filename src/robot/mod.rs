@@ -12,6 +12,7 @@ mod joints;
 mod limits;
 pub mod mesh;
 mod pairs;
+mod radii;
 mod reach;
 mod shapes;
 pub mod spec;
@@ -32,6 +33,7 @@ pub use convex::Convex;
 pub use findings::Finding;
 pub use init::{InitInputs, init};
 pub use pairs::{IgnoreReason, IgnoredPair};
+pub use radii::{LARGEST_DIFFERENCE, WheelRadii};
 pub use reach::ShapeReach;
 
 /// Where a stage gets files it must name itself (meshes). `cli` reads the disk, tests and MCAP attachments memory.
@@ -54,8 +56,8 @@ pub trait Files {
 pub struct RobotModel {
     /// The robot's name.
     pub name: String,
-    /// Of the driving wheels, m.
-    pub wheel_radius: f64,
+    /// Of the driving wheels.
+    pub wheel_radii: WheelRadii,
     /// Distance between the driving wheels, m.
     pub track_width: f64,
     /// The URDF's root link, and its pose in the base frame.
@@ -320,7 +322,7 @@ fn assemble(inputs: RobotInputs<'_>) -> Result<Assembled, Diagnostics> {
     }
     let mut robot = RobotModel {
         name: spec.name.clone().unwrap_or_else(|| urdf.robot.name.clone()),
-        wheel_radius: drive.wheel_radius,
+        wheel_radii: drive.wheel_radii,
         track_width: drive.track_width,
         root_link: urdf.robot.links[tree.root].name.clone(),
         base_from_root: drive.base_from_root,

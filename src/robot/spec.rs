@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::LARGEST_DIFFERENCE;
 use crate::diag::shape::{Bounds, Field, Shape};
 use crate::diag::yaml::{Entry, Node};
 use crate::diag::{Diagnostic, Diagnostics, Source, Span, json_schema as schema, shape, yaml};
@@ -28,8 +29,10 @@ pub struct RobotSpec {
     pub drive_left: Vec<Written<String>>,
     /// Joints of the right driving wheels.
     pub drive_right: Vec<Written<String>>,
-    /// `drive.wheel_radius_m`.
+    /// `drive.wheel_radius_m`: the mean.
     pub wheel_radius: Option<Written<f64>>,
+    /// `drive.wheel_difference`: the share by which the right wheel is larger than the left one.
+    pub wheel_difference: Option<f64>,
     /// `drive.track_width_m`.
     pub track_width: Option<Written<f64>>,
     /// `joints.moving`; `Some(empty)`: none moves.
@@ -86,7 +89,7 @@ static ROBOT: [Field; 7] = [
     ),
 ];
 
-static DRIVE: [Field; 4] = [
+static DRIVE: [Field; 5] = [
     Field::optional(
         "left",
         Shape::TextOrList,
@@ -104,6 +107,12 @@ static DRIVE: [Field; 4] = [
         Shape::Number(Bounds::positive("m")),
         "0.08",
         "metres; default: the wheel link's collision cylinder or sphere",
+    ),
+    Field::optional(
+        "wheel_difference",
+        Shape::Share(Bounds::between(-LARGEST_DIFFERENCE, LARGEST_DIFFERENCE, "")),
+        "0.2%",
+        "by how much the right wheel is larger than the left one, as a share of their mean, wheel_radius_m; default: 0",
     ),
     Field::optional(
         "track_width_m",
@@ -182,6 +191,7 @@ impl Reader<'_> {
             drive_left: self.names(self.get("drive", "left")),
             drive_right: self.names(self.get("drive", "right")),
             wheel_radius: self.number("drive", "wheel_radius_m"),
+            wheel_difference: self.get("drive", "wheel_difference").and_then(Node::share),
             track_width: self.number("drive", "track_width_m"),
             moving: self.get("joints", "moving").map(|n| self.names(Some(n))),
             fixed: self.fixed(),

@@ -114,7 +114,7 @@ mod tests {
         };
         let robot = RobotModel {
             name: "r".into(),
-            wheel_radius: 0.1,
+            wheel_radii: 0.1.into(),
             track_width: 0.3,
             root_link: "base".into(),
             base_from_root: nalgebra::Isometry3::identity(),

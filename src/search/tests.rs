@@ -32,7 +32,7 @@ fn scr_db() -> RobotModel {
     let cylinder = || Convex::Cylinder { radius: 0.08, half_length: 0.015 };
     RobotModel {
         name: "scr_db".into(),
-        wheel_radius: 0.08,
+        wheel_radii: 0.08.into(),
         track_width: 0.32,
         root_link: "base_link".into(),
         base_from_root: Isometry3::identity(),

@@ -7,7 +7,7 @@ pub fn robot(track_width: f64, wheel: [f64; 3], joints: Vec<MovingJoint>) -> Rob
     let [speed, acceleration, _] = wheel;
     RobotModel {
         name: "test".into(),
-        wheel_radius: 0.1,
+        wheel_radii: 0.1.into(),
         track_width,
         root_link: "base".into(),
         base_from_root: Default::default(),
@@ -42,7 +42,7 @@ pub fn scr_db() -> RobotModel {
         upper: std::f64::consts::PI,
         limits: limits([1.0, 2.0, 10.0]),
     };
-    RobotModel { wheel_radius: 0.08, ..robot(0.32, [0.5, 0.5, 2.0], vec![blade]) }
+    RobotModel { wheel_radii: 0.08.into(), ..robot(0.32, [0.5, 0.5, 2.0], vec![blade]) }
 }
 
 fn limits([speed, acceleration, jerk]: [f64; 3]) -> MotionLimits {

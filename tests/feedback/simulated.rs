@@ -88,7 +88,7 @@ impl Base {
         let (sin, cos) = start.yaw.sin_cos();
         let [dx, dy, turn] = fault.start;
         let pose = Pose2::new(start.x + cos * dx - sin * dy, start.y + sin * dx + cos * dy, start.yaw + turn);
-        let (radius, track) = (table.wheel_radius, table.track_width);
+        let (radius, track) = (table.wheel_radii.mean, table.track_width);
         Self { pose, fault, radius, track, time: 0.0, held: [0.0; 2], waiting: VecDeque::new() }
     }
 

@@ -254,7 +254,7 @@ fn table() -> CommandTable {
     CommandTable {
         sampling_time: 0.1,
         sampling: Sampling::Mean,
-        wheel_radius: 0.1,
+        wheel_radii: 0.1.into(),
         track_width: 0.4,
         joints: vec![("blade".into(), false)],
         rows: (0..12).map(row).collect(),

@@ -144,7 +144,7 @@ fn every_fault_of_a_table_is_refused() {
     let (robot, table, task) = case();
     let map = VoxelMap::new(0.1, [0.0; 3], [40, 40, 10], Unknown::Occupied);
     type Change = fn(&mut CommandTable, &mut Task);
-    let faults: [(&str, Change); 20] = [
+    let faults: [(&str, Change); 21] = [
         ("no rows", |t, _| t.rows.clear()),
         ("wheel not a number", |t, _| t.rows[1].wheel_left = f64::NAN),
         ("wheel infinite", |t, _| t.rows[1].wheel_right = f64::INFINITY),
@@ -154,7 +154,8 @@ fn every_fault_of_a_table_is_refused() {
         ("speed not a number", |t, _| t.rows[2].joint_velocities[0] = f64::NAN),
         ("sampling time zero", |t, _| t.sampling_time = 0.0),
         ("sampling time not a number", |t, _| t.sampling_time = f64::NAN),
-        ("other wheels", |t, _| t.wheel_radius = 0.11),
+        ("other wheels", |t, _| t.wheel_radii = 0.11.into()),
+        ("a larger right wheel", |t, _| t.wheel_radii.difference = 1e-3),
         ("other track", |t, _| t.track_width = 0.41),
         ("joint missing", |t, _| t.joints.clear()),
         ("joint of another name", |t, _| t.joints[0].0 = "other".into()),

@@ -20,7 +20,7 @@ pub(crate) const FREE: MotionLimits = MotionLimits { speed: None, acceleration: 
 pub(crate) fn bare_robot() -> RobotModel {
     RobotModel {
         name: "test".into(),
-        wheel_radius: 0.1,
+        wheel_radii: 0.1.into(),
         track_width: 0.4,
         root_link: "base".into(),
         base_from_root: Isometry3::identity(),
@@ -95,7 +95,7 @@ pub(crate) fn commands(
     let mut table = CommandTable {
         sampling_time: step,
         sampling: Sampling::Mean,
-        wheel_radius: robot.wheel_radius,
+        wheel_radii: robot.wheel_radii,
         track_width: robot.track_width,
         joints: robot.joints.iter().map(|j| (j.name.clone(), j.prismatic)).collect(),
         rows: Vec::new(),
@@ -104,8 +104,8 @@ pub(crate) fn commands(
     for (k, (speed, turn, rates)) in held.iter().chain([&rest]).enumerate() {
         let difference = 0.5 * turn * robot.track_width;
         table.rows.push(CommandRow {
-            wheel_left: (speed - difference) / robot.wheel_radius,
-            wheel_right: (speed + difference) / robot.wheel_radius,
+            wheel_left: (speed - difference) / robot.wheel_radii.mean,
+            wheel_right: (speed + difference) / robot.wheel_radii.mean,
             joint_positions: values.clone(),
             joint_velocities: rates.clone(),
             pose,

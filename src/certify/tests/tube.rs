@@ -155,7 +155,7 @@ fn deviations(own: &CommandTable, from: Pose2, table: &CommandTable, start: Pose
 
 #[test]
 fn wheels_one_percent_off_and_a_right_wheel_a_fifth_of_a_percent_larger_are_inside_and_nearly_at_the_edge() {
-    let robot = RobotModel { wheel_radius: 0.08, track_width: 0.32, ..bare_robot() };
+    let robot = RobotModel { wheel_radii: 0.08.into(), track_width: 0.32, ..bare_robot() };
     let (table, task) = nine_metres(&robot);
     let cases = [
         (Tolerance { wheel_radius: 0.01, ..Tolerance::default() }, [1.01, 1.01, 1.0]),
@@ -180,7 +180,7 @@ fn wheels_one_percent_off_and_a_right_wheel_a_fifth_of_a_percent_larger_are_insi
 
 #[test]
 fn the_tube_is_not_much_wider_than_the_farthest_corner_of_the_tolerance() {
-    let robot = RobotModel { wheel_radius: 0.08, track_width: 0.32, ..bare_robot() };
+    let robot = RobotModel { wheel_radii: 0.08.into(), track_width: 0.32, ..bare_robot() };
     let (table, task) = nine_metres(&robot);
     let tolerance = Tolerance { latency: 0.0, ..Tolerance::ASSUMED };
     let tube = tube_along(&table, &robot, &task, tolerance);

@@ -22,6 +22,8 @@ struct Description {
     map: Option<String>,
     inputs_blake3: String,
     wheel_radius_m: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    wheel_difference: Option<f64>,
     track_width_m: f64,
     joints: Vec<Joint>,
     commands: CommandsPart,
@@ -107,7 +109,8 @@ impl Description {
             robot: header.robot.clone(),
             map: header.map.clone(),
             inputs_blake3: header.inputs_blake3.clone(),
-            wheel_radius_m: table.wheel_radius,
+            wheel_radius_m: table.wheel_radii.mean,
+            wheel_difference: Some(table.wheel_radii.difference).filter(|share| *share != 0.0),
             track_width_m: table.track_width,
             joints: table.joints.iter().map(joint).collect(),
             commands: table.into(),
@@ -150,7 +153,9 @@ impl Description {
         line(&mut out, "inputs", &format!("blake3 {}", self.inputs_blake3));
         let CommandsPart { rows, sampling_time_s, sampling, duration_s } = &self.commands;
         line(&mut out, "rows", &format!("{rows} of {sampling_time_s} s, {duration_s} s in all, sampling {sampling}"));
-        line(&mut out, "wheels", &format!("radius {} m, track {} m", self.wheel_radius_m, self.track_width_m));
+        let larger = self.wheel_difference.map(|share| format!("the right one {:+} % larger, ", 100.0 * share));
+        let larger = larger.unwrap_or_default();
+        line(&mut out, "wheels", &format!("radius {} m, {larger}track {} m", self.wheel_radius_m, self.track_width_m));
         let joints: Vec<&str> = self.joints.iter().map(|j| j.name.as_str()).collect();
         line(&mut out, "joints", &if joints.is_empty() { "none".to_owned() } else { joints.join(", ") });
         line(&mut out, "drives", &format!("{:.3} m", self.metrics.length_m));

@@ -3,7 +3,7 @@ use crate::command::limits::{differences, largest_ratio};
 use crate::geom::Pose2;
 use crate::mission::TimeLaw;
 use crate::retime::{RetimeOptions, retime};
-use crate::robot::MotionLimits;
+use crate::robot::{MotionLimits, WheelRadii};
 use crate::trajectory::{Leg, StillLeg, Trajectory, TrajectorySource, fixtures, given};
 use proptest::prelude::*;
 
@@ -53,6 +53,24 @@ fn fast() -> RobotModel {
 
 fn options(sampling_time: f64, sampling: Sampling) -> SampleOptions {
     SampleOptions { sampling_time, sampling }
+}
+
+#[test]
+fn wheels_that_differ_are_turned_each_by_its_own_radius() {
+    let bend = given::from_bezier(&[[[0.0, 0.0], [1.0, 0.0], [2.0, 0.5], [2.0, 1.5]]], &[]).unwrap();
+    for sampling in [Sampling::Mean, Sampling::Tracked] {
+        let [alike, different] = [0.0, 0.04].map(|difference| {
+            let robot = RobotModel { wheel_radii: WheelRadii { mean: 0.1, difference }, ..fast() };
+            compile(&bend, &robot, TimeLaw::Wheel, options(0.05, sampling)).1
+        });
+        assert_eq!(alike.rows.len(), different.rows.len());
+        for (k, (a, b)) in alike.rows.iter().zip(&different.rows).enumerate() {
+            let ((l, r), (left, right)) = (alike.rim_speeds(k), different.rim_speeds(k));
+            assert!((l - left).abs() < 1e-9 && (r - right).abs() < 1e-9, "row {k}: {l} {r} against {left} {right}");
+            assert!((b.wheel_left - a.wheel_left / 0.98).abs() < 1e-7, "row {k}");
+            assert!((b.wheel_right - a.wheel_right / 1.02).abs() < 1e-7, "row {k}");
+        }
+    }
 }
 
 #[test]

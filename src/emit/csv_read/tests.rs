@@ -137,11 +137,12 @@ fn any_table() -> impl Strategy<Value = CommandTable> {
                 }
             });
         let rows = proptest::collection::vec(row, 1..6);
-        (rows, 1e-4..10.0, 1e-3..1.0, 0.01..2.0, 0usize..3).prop_map(move |(rows, dt, radius, track, sampling)| {
+        let radii = (1e-3..1.0, proptest::option::of(-0.1..0.1));
+        (rows, 1e-4..10.0, radii, 0.01..2.0, 0usize..3).prop_map(move |(rows, dt, (mean, larger), track, sampling)| {
             CommandTable {
                 sampling_time: dt,
                 sampling: [Sampling::Mean, Sampling::Instant, Sampling::Tracked][sampling],
-                wheel_radius: radius,
+                wheel_radii: WheelRadii { mean, difference: larger.unwrap_or(0.0) },
                 track_width: track,
                 joints: joints.clone(),
                 rows,

@@ -13,7 +13,7 @@ pub fn robot(base_from_root: Isometry3<f64>) -> RobotModel {
     let none = MotionLimits { speed: None, acceleration: None, jerk: None };
     RobotModel {
         name: "r".into(),
-        wheel_radius: 0.08,
+        wheel_radii: 0.08.into(),
         track_width: 0.32,
         root_link: "base_link".into(),
         base_from_root,

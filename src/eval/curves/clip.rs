@@ -6,7 +6,7 @@ use crate::geom::Pose2;
 /// The commands as a robot carries them out that clips each wheel's rim speed at `speed` (m/s), by itself, and follows them exactly
 /// otherwise.
 pub fn clipped(table: &CommandTable, speed: f64) -> CommandTable {
-    let rate = speed / table.wheel_radius;
+    let rate = speed / table.wheel_radii.mean;
     let mut table = table.clone();
     for row in &mut table.rows {
         row.wheel_left = row.wheel_left.clamp(-rate, rate);
@@ -37,7 +37,7 @@ mod tests {
         CommandTable {
             sampling_time: 0.1,
             sampling: Sampling::Instant,
-            wheel_radius: 0.1,
+            wheel_radii: 0.1.into(),
             track_width: 0.4,
             joints: Vec::new(),
             rows: (0..=rows).map(row).collect(),

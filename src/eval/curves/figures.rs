@@ -13,7 +13,7 @@ pub fn document(judged: &[Judged], robot: &RobotModel, held: Held) -> String {
     let document = json!({
         "curves": curves,
         "limits": {"speed_mps": wheel.speed, "acceleration_mps2": wheel.acceleration, "jerk_mps3": wheel.jerk},
-        "wheel_radius_m": robot.wheel_radius,
+        "wheel_radius_m": robot.wheel_radii.mean,
         "track_width_m": robot.track_width,
         "sampling_time_s": held.sampling_time,
         "sampling": names::sampling(held.sampling),

@@ -168,8 +168,8 @@ fn as_sampled_by_the_paper(profile: &MotionProfile, robot: &RobotModel, hold: f6
         let time = k as f64 * hold;
         let speeds = profile.speeds(time);
         CommandRow {
-            wheel_left: speeds[0] / robot.wheel_radius,
-            wheel_right: speeds[1] / robot.wheel_radius,
+            wheel_left: speeds[0] / robot.wheel_radii.mean,
+            wheel_right: speeds[1] / robot.wheel_radii.mean,
             joint_positions: profile.joints(time),
             joint_velocities: speeds[2..].to_vec(),
             pose: profile.pose(time),
@@ -178,7 +178,7 @@ fn as_sampled_by_the_paper(profile: &MotionProfile, robot: &RobotModel, hold: f6
     CommandTable {
         sampling_time: hold,
         sampling: Sampling::Instant,
-        wheel_radius: robot.wheel_radius,
+        wheel_radii: robot.wheel_radii,
         track_width: robot.track_width,
         joints: robot.joints.iter().map(|joint| (joint.name.clone(), joint.prismatic)).collect(),
         rows: (0..=intervals).map(row).collect(),

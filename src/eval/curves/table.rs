@@ -10,7 +10,7 @@ use crate::robot::RobotModel;
 pub fn table(judged: &[Judged], robot: &RobotModel, held: Held) -> String {
     let mut text = format!(
         "Curves of [CONV] section 3, and tighter ones: wheel radius {} m, track {} m, commands held for {} s\n\n",
-        robot.wheel_radius, robot.track_width, held.sampling_time
+        robot.wheel_radii.mean, robot.track_width, held.sampling_time
     );
     for one in judged {
         text += &of_curve(one, robot);

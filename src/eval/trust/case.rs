@@ -50,17 +50,18 @@ impl Case {
         let mut table = CommandTable {
             sampling_time: step,
             sampling: Sampling::Mean,
-            wheel_radius: robot.wheel_radius,
+            wheel_radii: robot.wheel_radii,
             track_width: robot.track_width,
             joints: robot.joints.iter().map(|j| (j.name.clone(), j.prismatic)).collect(),
             rows: Vec::with_capacity(held.len() + 1),
         };
         let (mut pose, mut values) = (start, joints.to_vec());
+        let radii = robot.wheel_radii.sides();
         for (k, (speed, turn, rates)) in held.iter().chain([&rest]).enumerate() {
             let difference = 0.5 * turn * robot.track_width;
             table.rows.push(CommandRow {
-                wheel_left: (speed - difference) / robot.wheel_radius,
-                wheel_right: (speed + difference) / robot.wheel_radius,
+                wheel_left: (speed - difference) / radii[0],
+                wheel_right: (speed + difference) / radii[1],
                 joint_positions: values.clone(),
                 joint_velocities: rates.clone(),
                 pose,

@@ -10,6 +10,7 @@ use crate::map::VoxelMap;
 use crate::mission::Unknown;
 use crate::robot::{
     BaseLimits, Body, BodyMotion, Convex, IgnoreReason, IgnoredPair, MotionLimits, MovingJoint, RobotModel, Shape,
+    WheelRadii,
 };
 
 pub(super) const FREE: MotionLimits = MotionLimits { speed: None, acceleration: None, jerk: None };
@@ -65,7 +66,7 @@ pub(super) fn hull(rng: &mut Rng, size: f64) -> Convex {
 pub(super) fn bare(rng: &mut Rng) -> RobotModel {
     RobotModel {
         name: "trust".into(),
-        wheel_radius: rng.uniform(0.04, 0.15),
+        wheel_radii: WheelRadii { mean: rng.uniform(0.04, 0.15), difference: rng.uniform(-0.05, 0.05) },
         track_width: rng.uniform(0.2, 0.6),
         root_link: "base".into(),
         base_from_root: Isometry3::identity(),

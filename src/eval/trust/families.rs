@@ -223,13 +223,14 @@ fn drive(rng: &mut Rng, family: Family) -> Case {
 fn limits(rng: &mut Rng) -> Case {
     let mut case = drive(rng, Family::Limits);
     let actuator = one_of(rng, 2 + case.robot.joints.len());
+    let radii = case.table.wheel_radii.sides();
     let speeds: Vec<f64> = case
         .table
         .rows
         .iter()
         .map(|row| match actuator {
-            0 => row.wheel_left * case.table.wheel_radius,
-            1 => row.wheel_right * case.table.wheel_radius,
+            0 => row.wheel_left * radii[0],
+            1 => row.wheel_right * radii[1],
             joint => row.joint_velocities[joint - 2],
         })
         .collect();
@@ -417,11 +418,12 @@ fn table(rng: &mut Rng) -> Case {
         _ => {
             case.task.reverse = false;
             // Turns on the spot, all but: backwards by about as much as rounding may be.
-            let back = rng.uniform(0.5e-6, 1.5e-6) / case.robot.wheel_radius;
+            let back = rng.uniform(0.5e-6, 1.5e-6);
+            let radii = case.table.wheel_radii.sides();
             let rows = case.table.rows.len() - 1;
             for row in &mut case.table.rows[..rows] {
-                let turn = 0.5 * (row.wheel_right - row.wheel_left);
-                (row.wheel_left, row.wheel_right) = (-turn - back, turn - back);
+                let turn = 0.5 * (radii[1] * row.wheel_right - radii[0] * row.wheel_left);
+                (row.wheel_left, row.wheel_right) = ((-turn - back) / radii[0], (turn - back) / radii[1]);
             }
             let replay = case.table.replay(case.task.start);
             let end = replay[replay.len() - 1];

@@ -34,9 +34,10 @@ impl Tracker<'_> {
             .map(|k| (self.motion.travel(k, at + time / hold) - self.motion.travel(k, at)) * hold / time)
             .collect();
         let mut wanted = if next.observer.is_some() && next.moves() { 1.0f64 } else { 0.0 };
-        for (side, speed) in [(-0.5, speeds[0]), (0.5, speeds[1])] {
+        for (wheel, side) in [-0.5, 0.5].into_iter().enumerate() {
+            let speed = speeds[wheel];
             let behind = (error.along + side * self.drive.track_width * error.heading) * speed.signum();
-            wanted = wanted.min(pace(behind, self.drive.wheel_radius * speed.abs(), WHEEL_LAG));
+            wanted = wanted.min(pace(behind, self.drive.wheel_radii[wheel] * speed.abs(), WHEEL_LAG));
         }
         for (joint, value) in seen.iter().flat_map(|seen| seen.joints.iter().enumerate()).take(next.joints.len()) {
             if let Some(value) = value {

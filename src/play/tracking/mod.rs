@@ -213,16 +213,14 @@ impl<'a> Tracker<'a> {
             pace(0).min(pace(1)).min(pace(2))
         });
         let fastest = fastest.fold(1.0, f64::min);
-        let reserve = |order: usize| {
-            let least = bounds[0][order].min(bounds[1][order]);
-            table.wheel_radius * RESERVE[order] * least
-        };
+        let radii = table.wheel_radii.sides();
+        let reserve = |order: usize| RESERVE[order] * (radii[0] * bounds[0][order]).min(radii[1] * bounds[1][order]);
         Self {
             gains: Gains::within(reserve(1), reserve(2)),
             fastest,
             motion,
             drive: Drive {
-                wheel_radius: table.wheel_radius,
+                wheel_radii: radii,
                 track_width: table.track_width,
                 noise: options.noise,
                 turn_noise: options.turn_noise,
@@ -314,9 +312,9 @@ impl<'a> Tracker<'a> {
             joint_velocities: next.held[2..].iter().map(|held| held.speed).collect(),
             pose: reference,
         };
-        let (radius, track) = (self.drive.wheel_radius, self.drive.track_width);
-        let twist =
-            (0.5 * radius * (row.wheel_left + row.wheel_right), radius * (row.wheel_right - row.wheel_left) / track);
+        let ([left, right], track) = (self.drive.wheel_radii, self.drive.track_width);
+        let (left, right) = (left * row.wheel_left, right * row.wheel_right);
+        let twist = (0.5 * (left + right), (right - left) / track);
         let command = Command {
             phase: next.phase,
             row,
@@ -378,7 +376,7 @@ impl<'a> Tracker<'a> {
         let mean = |wheel: usize| {
             (self.motion.travel(wheel, to / hold) - self.motion.travel(wheel, next.path_time / hold)) * hold / time
         };
-        let rims = [mean(0), mean(1)].map(|rate| self.drive.wheel_radius * rate);
+        let rims = [0, 1].map(|wheel| self.drive.wheel_radii[wheel] * mean(wheel));
         let reference =
             Twist { speed: 0.5 * (rims[0] + rims[1]), turn_rate: (rims[1] - rims[0]) / self.drive.track_width };
         let planned = self.rates(reference, shares);
@@ -407,7 +405,7 @@ impl<'a> Tracker<'a> {
     /// Rates of the wheels that make a twist, with wheels as they are believed to be.
     fn rates(&self, twist: Twist, shares: Shares) -> [f64; 2] {
         let half = 0.5 * self.drive.track_width * (1.0 + shares.track) * twist.turn_rate;
-        let radius = |wheel: usize| self.drive.wheel_radius * (1.0 + shares.radii[wheel]);
+        let radius = |wheel: usize| self.drive.wheel_radii[wheel] * (1.0 + shares.radii[wheel]);
         [(twist.speed - half) / radius(0), (twist.speed + half) / radius(1)]
     }
 

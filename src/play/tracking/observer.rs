@@ -46,8 +46,8 @@ type Covariance = SMatrix<f64, 7, 7>;
 /// Geometry of the drive as the file has it, and what poses are worth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drive {
-    /// m.
-    pub wheel_radius: f64,
+    /// Of the left and the right wheel, m.
+    pub wheel_radii: [f64; 2],
     /// m.
     pub track_width: f64,
     /// Standard deviation of a pose's coordinates, m.
@@ -147,7 +147,7 @@ impl Observer {
         jacobian[(0, 2)] = -dy;
         jacobian[(1, 2)] = dx;
         for (side, rate) in wheels.into_iter().enumerate() {
-            let rim = drive.wheel_radius * rate;
+            let rim = drive.wheel_radii[side] * rate;
             let sign = if side == 0 { -1.0 } else { 1.0 };
             let column = by_speed * (0.5 * rim) + by_rate * (sign * rim / track);
             jacobian.fixed_view_mut::<3, 1>(0, 3 + side).copy_from(&column);
@@ -231,7 +231,7 @@ impl Observer {
     /// Speed and turn rate that rates of the wheels make.
     fn twist(&self, drive: &Drive, wheels: [f64; 2]) -> (f64, f64) {
         let shares = self.shares();
-        let rims = [0, 1].map(|side| drive.wheel_radius * (1.0 + shares.radii[side]) * wheels[side]);
+        let rims = [0, 1].map(|side| drive.wheel_radii[side] * (1.0 + shares.radii[side]) * wheels[side]);
         (0.5 * (rims[0] + rims[1]), (rims[1] - rims[0]) / (drive.track_width * (1.0 + shares.track)))
     }
 }
@@ -241,7 +241,7 @@ mod tests {
     use super::*;
 
     const DRIVE: Drive =
-        Drive { wheel_radius: 0.1, track_width: 0.4, noise: 0.005, turn_noise: 0.5 * std::f64::consts::PI / 180.0 };
+        Drive { wheel_radii: [0.1; 2], track_width: 0.4, noise: 0.005, turn_noise: 0.5 * std::f64::consts::PI / 180.0 };
 
     /// Rates of the wheels: ahead, bends to both sides, a spin.
     fn history() -> VecDeque<Executed> {

@@ -33,7 +33,7 @@ fn run(
     for k in 0..steps {
         if let Some(last) = commands.last() {
             let table = tracker.motion.table();
-            let rim = |rate: f64, side: usize| table.wheel_radius * (1.0 + world.radii[side]) * rate;
+            let rim = |rate: f64, side: usize| table.wheel_radii.sides()[side] * (1.0 + world.radii[side]) * rate;
             let (left, right) = (rim(last.row.wheel_left, 0), rim(last.row.wheel_right, 1));
             world.pose = world.pose.after_twist(0.5 * (left + right), (right - left) / table.track_width, period);
         }

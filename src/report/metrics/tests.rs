@@ -12,7 +12,7 @@ fn robot() -> RobotModel {
         |speed, acceleration| MotionLimits { speed: Some(speed), acceleration: Some(acceleration), jerk: None };
     RobotModel {
         name: "r".into(),
-        wheel_radius: 0.1,
+        wheel_radii: 0.1.into(),
         track_width: 0.4,
         root_link: "base".into(),
         base_from_root: nalgebra::Isometry3::identity(),
@@ -150,7 +150,7 @@ fn held_commands_are_differenced_with_rest_on_both_sides() {
     let table = CommandTable {
         sampling_time: 0.5,
         sampling: Sampling::Mean,
-        wheel_radius: 0.1,
+        wheel_radii: 0.1.into(),
         track_width: 0.4,
         joints: vec![("blade".into(), false)],
         rows: vec![row(0.1, 0.2), row(0.3, 0.0), row(0.0, 0.0)],

@@ -37,7 +37,7 @@ fn robot(joint: &str) -> RobotModel {
         |name: &str, prismatic: bool| MovingJoint { name: name.into(), prismatic, lower: -1.0, upper: 1.0, limits };
     RobotModel {
         name: "test".into(),
-        wheel_radius: 0.1,
+        wheel_radii: 0.1.into(),
         track_width: 0.4,
         root_link: "base".into(),
         base_from_root: Isometry3::identity(),
@@ -81,7 +81,7 @@ fn table(robot: &RobotModel, rows: usize) -> CommandTable {
     let mut table = CommandTable {
         sampling_time: step,
         sampling: Sampling::Mean,
-        wheel_radius: robot.wheel_radius,
+        wheel_radii: robot.wheel_radii,
         track_width: robot.track_width,
         joints: robot.joints.iter().map(|j| (j.name.clone(), j.prismatic)).collect(),
         rows: Vec::new(),
@@ -91,8 +91,8 @@ fn table(robot: &RobotModel, rows: usize) -> CommandTable {
         let rate = 0.4 * wave(k) * (k as f64 * 0.2).cos();
         let velocities = vec![rate; joints.len()];
         table.rows.push(CommandRow {
-            wheel_left: left / robot.wheel_radius,
-            wheel_right: right / robot.wheel_radius,
+            wheel_left: left / robot.wheel_radii.mean,
+            wheel_right: right / robot.wheel_radii.mean,
             joint_positions: joints.clone(),
             joint_velocities: velocities,
             pose,

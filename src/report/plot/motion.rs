@@ -106,7 +106,7 @@ mod tests {
         CommandTable {
             sampling_time: 0.1,
             sampling: Sampling::Mean,
-            wheel_radius: 0.08,
+            wheel_radii: 0.08.into(),
             track_width: 0.32,
             joints: vec![("lift".into(), true)],
             rows: vec![row(-0.1, 0.1), row(-0.1, 0.1), row(0.2, 0.2), row(0.0, 0.0)],

@@ -54,6 +54,7 @@ fn report() -> Report {
     report.robot = Some(RobotPart {
         name: "scr_db".into(),
         wheel_radius_m: 0.08,
+        wheel_difference: None,
         track_width_m: 0.32,
         joints: vec![joint("blade", false)],
         shapes: 5,

@@ -11,7 +11,7 @@ mod real_robots;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::spec::{RobotSpec, Written};
+use super::spec::{self, RobotSpec, Written};
 use super::{Files, RobotInputs, RobotModel, parse};
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::mission::{ActuatorLimitsSpec, LimitsSpec};

@@ -80,9 +80,21 @@ fn box_base_has_the_measured_dimensions_and_no_joint() {
 }
 
 #[test]
+fn wheels_that_differ_have_a_radius_each_and_the_smaller_one_is_the_slower() {
+    let yaml = "urdf: a.urdf\ndrive: {wheel_radius_m: 0.08, wheel_difference: -1%}\n";
+    let robot =
+        read(include_str!("../../../robots/box_base/box_base.urdf"), &spec::parse("a.yaml", yaml).unwrap()).unwrap();
+    let [left, right] = robot.wheel_radii.sides();
+    assert!((left - 0.0804).abs() < 1e-15 && (right - 0.0796).abs() < 1e-15, "{left} {right}");
+    let speed = robot.wheel.speed.unwrap();
+    assert!((speed - 0.5 * 0.995).abs() < 1e-12, "{speed}");
+    assert!(robot.describe().contains("the right wheel -1.000 % larger"), "{}", robot.describe());
+}
+
+#[test]
 fn conv_finds_its_wheels_by_itself() {
     let robot = read(include_str!("../../../robots/conv/conv.urdf"), &RobotSpec::default()).unwrap();
-    assert_eq!((robot.name.as_str(), robot.wheel_radius, robot.track_width), ("conv", 0.1, 0.4));
+    assert_eq!((robot.name.as_str(), robot.wheel_radii.mean, robot.track_width), ("conv", 0.1, 0.4));
     assert_near(dimensions(&robot, &[]), [-0.2, 0.2, 0.43, 0.3, 0.2 * 2f64.sqrt()], 1e-9);
 }
 
@@ -109,7 +121,7 @@ const TURNED_WHEELS: &str = r#"<robot name="burger">
 #[test]
 fn rounded_wheel_frames_castors_and_a_raised_root_are_understood() {
     let robot = read(TURNED_WHEELS, &RobotSpec::default()).unwrap();
-    assert_eq!((robot.wheel_radius, robot.joint_count()), (0.033, 0));
+    assert_eq!((robot.wheel_radii.mean, robot.joint_count()), (0.033, 0));
     assert!((robot.track_width - 0.16).abs() < 1e-12);
     let e = robot.extents(&[]);
     for (found, expected) in e.min.iter().chain(&e.max).zip([-0.102, -0.089, 0.0, 0.038, 0.089, 0.19125]) {

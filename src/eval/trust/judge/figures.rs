@@ -1,7 +1,7 @@
 //! The judge's bookkeeping of numbers: the table in itself, and the limits of actuators.
 
 use super::Truth;
-use super::motion::Motion;
+use super::motion::{Motion, radius};
 use crate::eval::trust::case::Case;
 
 /// Limits hold up to this share more: rounding in digits as written.
@@ -60,7 +60,7 @@ pub(super) fn limits(case: &Case, note: &mut impl FnMut(Truth)) {
     let (table, robot) = (&case.table, &case.robot);
     let wheel = |left: bool| {
         let speed = move |row: &crate::command::CommandRow| if left { row.wheel_left } else { row.wheel_right };
-        table.rows.iter().map(|row| table.wheel_radius * speed(row)).collect::<Vec<f64>>()
+        table.rows.iter().map(|row| radius(table, left) * speed(row)).collect::<Vec<f64>>()
     };
     let mut actuators = vec![(robot.wheel, wheel(true)), (robot.wheel, wheel(false))];
     for (index, joint) in robot.joints.iter().enumerate() {

@@ -118,10 +118,16 @@ impl<'a> Motion<'a> {
     }
 }
 
+/// Of one wheel, m.
+pub(super) fn radius(table: &CommandTable, left: bool) -> f64 {
+    let half = table.wheel_radii.difference / 2.0;
+    table.wheel_radii.mean * if left { 1.0 - half } else { 1.0 + half }
+}
+
 /// Speed along (m/s) and turn rate (rad/s) of a row: \[SCR\] Eq. 1 with its halves.
 pub(super) fn held(table: &CommandTable, row: usize) -> [f64; 2] {
     let row = &table.rows[row];
-    let (left, right) = (row.wheel_left * table.wheel_radius, row.wheel_right * table.wheel_radius);
+    let (left, right) = (row.wheel_left * radius(table, true), row.wheel_right * radius(table, false));
     [(right + left) / 2.0, (right - left) / table.track_width]
 }
 
