@@ -8,7 +8,7 @@ mod stops;
 mod world;
 
 pub use attempts::OPTIMISER_MARGINS;
-pub use check::{check, path_error_of_commands};
+pub use check::{check, path_error_of_commands, trust};
 pub use place::Place;
 pub use plan::SEARCH_MARGIN;
 pub use world::world;

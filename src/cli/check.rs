@@ -6,7 +6,7 @@ use super::inputs::commands::{self, LoadedCommands, Origin, Places};
 use super::terminal::Terminal;
 use crate::certify::Certificate;
 use crate::diag::Diagnostics;
-use crate::report::schema::{CertificatePart, LimitPart, RobotPart};
+use crate::report::schema::{CertificatePart, LimitPart, RobotPart, TrustPart};
 use crate::report::summary;
 
 /// Check a command file against its robot, map, limits and goal, without planning anything.
@@ -39,29 +39,35 @@ pub fn check(args: &CheckArgs, terminal: &mut Terminal) -> Result<u8, Diagnostic
     let places = Places { mission: args.mission.as_deref(), map: args.map.as_deref() };
     let loaded = commands::load(&args.commands, places)?;
     let certificate = loaded.certify()?;
-    let text = if args.json { json(&loaded, &certificate) } else { readable(&loaded, &certificate) };
+    // Of what does not hold there is nothing to trust.
+    let trust = if certificate.holds() { loaded.trust()? } else { None };
+    let trust = trust.as_ref();
+    let text = if args.json { json(&loaded, &certificate, trust) } else { readable(&loaded, &certificate, trust) };
     terminal.print(&text);
     Ok(u8::from(!certificate.holds()))
 }
 
-fn json(loaded: &LoadedCommands, certificate: &Certificate) -> String {
+fn json(loaded: &LoadedCommands, certificate: &Certificate, trust: Option<&TrustPart>) -> String {
     let part: CertificatePart = certificate.into();
     let limits: Vec<LimitPart> = certificate.limits.iter().map(Into::into).collect();
     let refusals: Vec<&str> = certificate.refusals.iter().map(|r| r.message.as_str()).collect();
     let value = serde_json::json!({
         "holds": certificate.holds(), "certificate": part, "limits": limits, "refusals": refusals,
-        "inputs_changed": !loaded.as_made,
+        "trust": trust, "inputs_changed": !loaded.as_made,
     });
     format!("{value:#}\n")
 }
 
-fn readable(loaded: &LoadedCommands, certificate: &Certificate) -> String {
+fn readable(loaded: &LoadedCommands, certificate: &Certificate, trust: Option<&TrustPart>) -> String {
     let verdict = if certificate.holds() { "all checks hold" } else { "CHECKS FAIL" };
     let mut out = format!("{}: {verdict}\n\n", loaded.file.path.display());
     summary::line(&mut out, "against", &against(loaded));
     let robot = RobotPart::from(&loaded.world.robot);
     let limits: Vec<LimitPart> = certificate.limits.iter().map(Into::into).collect();
     summary::proof(&mut out, &certificate.into(), &limits, Some(&robot));
+    if let Some(trust) = trust {
+        summary::line(&mut out, "trust", &summary::trust_text(trust));
+    }
     for refusal in &certificate.refusals {
         summary::line(&mut out, "refused", &refusal.message);
     }

@@ -140,7 +140,8 @@ pub fn play(args: &PlayArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics>
     let urgent = realtime::ask_for();
     if let Some(source) = &args.feedback.feedback {
         let asked = || requests.load(Ordering::SeqCst);
-        let followed = following.live(source, args.sinks.wait, sink.as_mut(), &asked).map_err(not_begun)?;
+        let poses = following.poses(source, &args.sinks)?;
+        let followed = following.live(poses, args.sinks.wait, sink.as_mut(), &asked).map_err(not_begun)?;
         let done = followed.phase == Phase::Done && followed.cut.is_none();
         if args.json {
             terminal.print(&feedback::for_programs(&followed));

@@ -16,6 +16,7 @@ use crate::emit::mcap_read::{self, Attached, Topic};
 use crate::mission;
 use crate::pipeline::{self, Inputs, World};
 use crate::report::Report;
+use crate::report::schema::TrustPart;
 use crate::robot::spec;
 
 /// What to do with a file that cannot be checked by itself.
@@ -288,6 +289,14 @@ impl LoadedCommands {
         let mut certificate = pipeline::check(&self.inputs, &self.world, &self.file.table)?;
         certificate.refusals.extend(self.file.contradictions.iter().map(contradiction));
         Ok(certificate)
+    }
+
+    /// How far they can be trusted without feedback.
+    ///
+    /// # Errors
+    /// As [`Self::certify`].
+    pub fn trust(&self) -> Result<Option<TrustPart>, Diagnostics> {
+        pipeline::trust(&self.inputs, &self.world, &self.file.table)
     }
 }
 

@@ -5,8 +5,11 @@ use crate::certify::{self, Certificate, Demands, Task};
 use crate::command::CommandTable;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::geom::Pose2;
+use crate::mission::Tolerance;
 use crate::report::path_error;
+use crate::report::schema::TrustPart;
 use crate::retime::{self, RetimeOptions};
+use crate::robot::RobotModel;
 use crate::trajectory::Trajectory;
 
 /// Judges commands that this program did not plan, against a mission's robot, map, limits, start and goal.
@@ -17,6 +20,25 @@ use crate::trajectory::Trajectory;
 /// Joints of the table that are not the robot's; no rows; a given path that is none.
 pub fn check(inputs: &Inputs, world: &World, table: &CommandTable) -> Result<Certificate, Diagnostics> {
     let World { robot, map } = world;
+    let mission = &inputs.mission;
+    let task = task(inputs, robot, table)?;
+    let demands = Demands { vias: &vias(mission, robot), zones: mission.speed_zones() };
+    Ok(certify::certify_through(table, robot, map.as_deref(), &task, demands))
+}
+
+/// How far such commands can be trusted without feedback, within the robot's tolerance or, without one, the one assumed.
+///
+/// # Errors
+/// As [`check`].
+pub fn trust(inputs: &Inputs, world: &World, table: &CommandTable) -> Result<Option<TrustPart>, Diagnostics> {
+    let World { robot, map } = world;
+    let tolerance = robot.tolerance.unwrap_or(Tolerance::ASSUMED);
+    let trust = certify::trust(table, robot, map.as_deref(), &task(inputs, robot, table)?, tolerance);
+    Ok(trust.map(|trust| TrustPart::new(&trust, robot.tolerance.is_some(), map.is_some())))
+}
+
+/// What the mission asks of a table; what it leaves open is as the table has it.
+fn task(inputs: &Inputs, robot: &RobotModel, table: &CommandTable) -> Result<Task, Diagnostics> {
     let mission = &inputs.mission;
     let expected: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
     let found: Vec<&str> = table.joints.iter().map(|(name, _)| name.as_str()).collect();
@@ -45,9 +67,7 @@ pub fn check(inputs: &Inputs, world: &World, table: &CommandTable) -> Result<Cer
     let start_joints =
         start_joints.map(|(j, own)| asked.and_then(|p| p.joints.get(&j.name).copied()).unwrap_or(*own)).collect();
     let goal = goal(mission, robot, given.as_ref().map(end_of));
-    let task = Task { start, start_joints, goal, clearance: mission.clearance, reverse: mission.reverse };
-    let demands = Demands { vias: &vias(mission, robot), zones: mission.speed_zones() };
-    Ok(certify::certify_through(table, robot, map.as_deref(), &task, demands))
+    Ok(Task { start, start_joints, goal, clearance: mission.clearance, reverse: mission.reverse })
 }
 
 /// The path error of commands as they are written: their replay against the mission's given path, or, where the path was

@@ -30,7 +30,7 @@ pub struct Followed {
 /// Follows a motion to its end, or to a stop. `requests` as of [`super::play`]; gives up when no pose has come within `wait` seconds.
 ///
 /// # Errors
-/// The sink did not get ready, or no pose came; nothing but zeros was sent then.
+/// The sink did not get ready, or no pose came; nothing was sent then.
 pub fn follow(
     tracker: &Tracker<'_>,
     motion: &Motion,
@@ -50,9 +50,9 @@ pub fn follow(
         time: 0.0,
         end: (f64::INFINITY, f64::INFINITY),
     };
-    let (mut first, mut told, mut frames, mut heeded) = (None, None, 0usize, 0);
+    let (mut first, mut told, mut ticks, mut frames, mut heeded) = (None, None, 0usize, 0usize, 0);
     loop {
-        let due = out.sent as f64 * period;
+        let due = ticks as f64 * period;
         while let Some(frame) = sink.frame_time().map(|step| frames as f64 * step).filter(|at| *at < due - 1e-9) {
             clock.wait(zero + frame, &|| requests() > heeded.max(1));
             if let cut @ Some(_) = lost(sink.frame(frame, None), &mut state, tracker) {
@@ -106,8 +106,14 @@ pub fn follow(
             row.joint_velocities.iter_mut().for_each(|speed| *speed = 0.0);
         }
         let sent = sink::Command { sequence: out.sent as u64, time: command.path_time, row: &row, twist };
-        let cut = lost(sink.send(&sent, due), &mut state, tracker);
-        out.sent += 1;
+        // Before the first pose the receiver has not been told what comes, and there is nothing to be done.
+        let cut = if told.is_some() {
+            out.sent += 1;
+            lost(sink.send(&sent, due), &mut state, tracker)
+        } else {
+            None
+        };
+        ticks += 1;
         out.phase = command.phase;
         out.time = first.map_or(0.0, |first| now - first);
         out.end = (command.error.along.hypot(command.error.across), command.error.heading.abs());
@@ -212,7 +218,7 @@ mod tests {
     fn without_poses_nothing_begins_and_when_they_end_the_robot_stops() {
         let (result, heard, _) = followed(-1.0, &|| 0);
         assert!(matches!(result, Err(SinkError::NotReady(_))));
-        assert!(heard.commands.iter().all(|(_, _, wheels)| *wheels == [0.0; 2]));
+        assert_eq!((heard.commands.len(), heard.plans.len()), (0, 0), "no command before what it belongs to");
         let (result, heard, _) = followed(3.0, &|| 0);
         assert!(matches!(result.map(|f| f.phase), Ok(Phase::Stopped(Why::Lost(_)))));
         assert_eq!(heard.commands.last().map(|c| c.2), Some([0.0; 2]));

@@ -1,6 +1,10 @@
 //! Where poses come from, and how they are written: a JSON object each, `{"t": 1.25, "x": 0.5, "y": 1.5, "yaw": 0.1}`, metres and radians in the
 //! map's frame, and where joints are measured `"joints": {"arm": 0.3}`.
 
+#[cfg(feature = "ros2")]
+pub mod dds;
+pub mod ros;
+
 use std::net::UdpSocket;
 
 use serde_json::Value;

@@ -4,6 +4,8 @@ use std::io::{BufRead, Write};
 
 use serde_json::json;
 
+use super::sinks::{self, SinkArgs};
+
 use crate::command::CommandTable;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::play::follow::{Followed, follow};
@@ -25,23 +27,33 @@ const TURN: f64 = 0.5;
 pub(super) enum Source {
     /// `udp://HOST:PORT`: JSON in datagrams.
     Udp(String),
+    /// `ros2[:/TOPIC]`: odometry, or transforms where the topic is `/tf`.
+    Ros2(String),
 }
 
 fn source(text: &str) -> Result<Source, String> {
+    let named = |topic: &str| topic.strip_prefix('/').is_some_and(|name| !name.is_empty() && !name.contains(' '));
     match text.strip_prefix("udp://") {
+        None if text == "ros2" => Ok(Source::Ros2("/odom".to_owned())),
+        None if text.strip_prefix("ros2:").is_some_and(named) => Ok(Source::Ros2(text[5..].to_owned())),
         Some(at) if at.rsplit_once(':').is_some_and(|(host, port)| !host.is_empty() && port.parse::<u16>().is_ok()) => {
             Ok(Source::Udp(at.to_owned()))
         }
-        _ => Err(format!("no source `{text}`; there is udp://HOST:PORT, where poses are sent to")),
+        _ => Err(format!("no source `{text}`; there are udp://HOST:PORT, where poses are sent to, and ros2[:/TOPIC]")),
     }
 }
 
 /// How to play with feedback.
 #[derive(Debug, clap::Args)]
 pub(super) struct FeedbackArgs {
-    /// Follow the path by measured poses, JSON objects {"t", "x", "y", "yaw"} in datagrams to udp://HOST:PORT here.
+    /// Follow the path by measured poses: JSON objects {"t", "x", "y", "yaw"} in datagrams to udp://HOST:PORT here, or ros2[:/TOPIC],
+    /// Odometry [default: /odom] or, of /tf, transforms.
     #[arg(long, value_name = "SOURCE", value_parser = source)]
     pub feedback: Option<Source>,
+    /// Feedback from /tf: the frame in which the mission's poses are.
+    #[arg(long, value_name = "FRAME", default_value = "map")]
+    #[cfg_attr(not(feature = "ros2"), allow(dead_code))]
+    map_frame: String,
     /// Feedback: stop when a point of the robot may be this far from where it is planned, in metres [default: the proven clearance].
     #[arg(long, value_name = "M", value_parser = positive)]
     leave_m: Option<f64>,
@@ -101,17 +113,36 @@ pub(super) struct Following<'a> {
 }
 
 impl Following<'_> {
+    /// A source of poses, opened.
+    ///
+    /// # Errors
+    /// It cannot be had; it was not built in.
+    pub fn poses(&self, source: &Source, sinks: &SinkArgs) -> Result<Box<dyn Poses>, Diagnostics> {
+        let joints = &self.motion.table().joints;
+        // Unused where ROS 2 was not built in.
+        let _ = sinks;
+        match source {
+            Source::Udp(at) => Ok(Box::new(UdpPoses::new(at, joints).map_err(sinks::fault)?)),
+            #[cfg(feature = "ros2")]
+            Source::Ros2(topic) => {
+                let frames = poses::ros::Frames::new(self.robot, &self.args.map_frame);
+                let poses = poses::dds::DdsPoses::new(sinks::domain(sinks)?, topic, frames, joints.len());
+                Ok(Box::new(poses.map_err(sinks::fault)?))
+            }
+            #[cfg(not(feature = "ros2"))]
+            Source::Ros2(_) => Err(sinks::not_built("ros2")),
+        }
+    }
+
     /// In real time, by the poses of a source.
     pub fn live(
         &self,
-        source: &Source,
+        mut poses: Box<dyn Poses>,
         wait: f64,
         sink: &mut dyn Sink,
         requests: &dyn Fn() -> usize,
     ) -> Result<Followed, SinkError> {
-        let Source::Udp(at) = source;
         let table = self.motion.table();
-        let mut poses: Box<dyn Poses> = Box::new(UdpPoses::new(at, &table.joints)?);
         let tube = self.args.tube(self.robot, table, self.clearance);
         let tracker = Tracker::new(self.motion, self.robot, self.limits, &tube, self.args.options(self.reverse));
         let period = table.sampling_time.min(0.5 * law::longest_hold(0.0)).min(0.1);

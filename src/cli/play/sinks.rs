@@ -159,7 +159,7 @@ fn transport(
 }
 
 /// The domain asked for, or that of ROS 2's own environment variable.
-fn domain(args: &SinkArgs) -> Result<u16, Diagnostics> {
+pub(super) fn domain(args: &SinkArgs) -> Result<u16, Diagnostics> {
     match (args.domain, std::env::var("ROS_DOMAIN_ID")) {
         (Some(domain), _) => Ok(domain),
         (None, Err(_)) => Ok(0),
@@ -170,13 +170,13 @@ fn domain(args: &SinkArgs) -> Result<u16, Diagnostics> {
     }
 }
 
-fn fault(error: SinkError) -> Diagnostics {
+pub(super) fn fault(error: SinkError) -> Diagnostics {
     Diagnostic::error("play/not-ready", error).into()
 }
 
 #[cfg(not(all(feature = "can", feature = "foxglove", feature = "ros2", feature = "zenoh", target_os = "linux")))]
-fn not_built(feature: &str) -> Diagnostics {
-    let message = format!("this trajc was built without the sink `{feature}`");
+pub(super) fn not_built(feature: &str) -> Diagnostics {
+    let message = format!("this trajc was built without `{feature}`");
     let hint = format!("build it with: cargo install --path . --features {feature}");
     Diagnostic::error("play/not-built", message).hint(hint).into()
 }
