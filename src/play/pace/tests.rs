@@ -31,16 +31,20 @@ fn off_the_path(motion: &Motion, stop: &Stop) -> (f64, f64) {
     off.fold((0.0, 0.0), |(d, a): (f64, f64), (distance, angle)| (d.max(distance), a.max(angle)))
 }
 
-/// What a stop may leave the path by, m: the file's arcs are polygons in heading, a stop rounds them. A row's corner of turn rate, by the
-/// square of a row's time over 8 is the heading that differs, and every metre driven with it moves the robot aside.
+/// What a stop may leave the path by, m: the file's arcs are polygons in heading, a stop rounds them. A row that has a corner of turn rate
+/// within it differs by a triangle of heading, whose area is at most the corner times the square of the row's time over 8: times the speed
+/// it is what the robot is moved aside. A corner of speed does the same to a robot that turns.
 fn bound(motion: &Motion, stop: &Stop) -> f64 {
     let (table, hold) = (motion.table(), motion.table().sampling_time);
     let first = stop.path_times[0] as usize;
     let last = (stop.path_times[stop.path_times.len() - 1].ceil() as usize + 6).min(table.rows.len() - 1);
     let rows = first.saturating_sub(6)..=last;
     let fastest = rows.clone().map(|k| table.twist(k).0.abs()).fold(0.0, f64::max);
-    let turned: f64 = rows.map(|k| (table.twist(k).1 - if k > 0 { table.twist(k - 1).1 } else { 0.0 }).abs()).sum();
-    fastest * turned * hold * hold / 8.0 + 1e-9
+    let sharpest = rows.clone().map(|k| table.twist(k).1.abs()).fold(0.0, f64::max);
+    let before = |k: usize| if k > 0 { table.twist(k - 1) } else { (0.0, 0.0) };
+    let sped: f64 = rows.clone().map(|k| (table.twist(k).0 - before(k).0).abs()).sum();
+    let turned: f64 = rows.map(|k| (table.twist(k).1 - before(k).1).abs()).sum();
+    (fastest * turned + sharpest * sped) * hold * hold / 8.0 + 1e-9
 }
 
 fn check(motion: &Motion, robot: &RobotModel, limits: &Limits, at: usize) -> Result<(), TestCaseError> {
