@@ -8,7 +8,7 @@ use std::fs::{self, Metadata};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use blake3::Hash;
 
@@ -16,6 +16,8 @@ use crate::cli::inputs::{regular, tidy};
 
 /// The cache's file in the output folder.
 pub const CACHE: &str = ".trajc-build";
+/// What it is called until it is whole.
+const UNFINISHED: &str = ".trajc-build.new";
 /// First line of that file.
 const HEAD: &str = "trajc.hashes/1";
 /// Two changes within this time may leave a file with the same times: clocks of file systems tick that slowly.
@@ -164,18 +166,37 @@ impl Hashes {
             }
         }
         // One build at a time has the folder, so the name is nobody else's.
-        let new = out.join(format!("{CACHE}.new"));
-        if fs::write(&new, text).is_ok() {
-            let _ = fs::rename(&new, out.join(CACHE));
+        let new = out.join(UNFINISHED);
+        if fs::write(&new, text).and_then(|()| fs::rename(&new, out.join(CACHE))).is_err() {
+            // Half of it may be there, and take the last room on a disk.
+            let _ = fs::remove_file(&new);
         }
     }
 }
 
-/// The stamp of a file that was not written to within the last tick of the clock; waits where it was.
+/// Removes what a build left that was killed while it kept its hashes.
+pub fn sweep(out: &Path) {
+    let _ = fs::remove_file(out.join(UNFINISHED));
+}
+
+/// When a file was written to last. What decides is the time that nobody can set: files copied with their dates look old.
+#[cfg(unix)]
+fn written(found: &Metadata) -> Option<SystemTime> {
+    let (changed_ns, _) = changed(found);
+    SystemTime::UNIX_EPOCH.checked_add(Duration::from_nanos(u64::try_from(changed_ns).ok()?))
+}
+
+#[cfg(not(unix))]
+fn written(found: &Metadata) -> Option<SystemTime> {
+    found.modified().ok()
+}
+
+/// The stamp of a file that was not written to within the last tick of the clock; waits where it was. A time yet to come (the clock was
+/// set back) is none that a change made now could have.
 fn settled(path: &Path) -> io::Result<Option<Stamp>> {
     regular(path)?;
     let found = fs::metadata(path)?;
-    let age = found.modified().ok().and_then(|modified| modified.elapsed().ok());
+    let age = written(&found).and_then(|written| written.elapsed().ok());
     match age.and_then(|age| TICK.checked_sub(age)) {
         // It may have been written to while we waited; then the next build sees another stamp and reads it.
         Some(rest) => {
@@ -242,6 +263,27 @@ mod tests {
         fs::write(&file, "two").expect("scratch");
         assert_eq!(hashes.hash(&file).expect("there"), blake3::hash(b"one"));
         assert_eq!(hashes.read(&file).expect("there"), (b"two".to_vec(), blake3::hash(b"two")));
+    }
+
+    #[test]
+    fn a_change_within_a_tick_of_the_clock_is_seen_whatever_date_the_file_is_given() {
+        let folder = scratch();
+        let file = folder.path().join("a");
+        for date in [SystemTime::UNIX_EPOCH + 300 * TICK, SystemTime::now() + Duration::from_secs(1 << 30)] {
+            for _ in 0..5 {
+                let put = |text: &str| {
+                    fs::write(&file, text).expect("scratch");
+                    fs::File::options().write(true).open(&file).and_then(|f| f.set_modified(date)).expect("a date");
+                };
+                put("one");
+                let first = Hashes::load(folder.path(), folder.path());
+                assert_eq!(first.hash(&file).expect("there"), blake3::hash(b"one"));
+                put("two");
+                first.save(folder.path());
+                let second = Hashes::load(folder.path(), folder.path());
+                assert_eq!(second.hash(&file).expect("there"), blake3::hash(b"two"));
+            }
+        }
     }
 
     #[test]
