@@ -8,6 +8,9 @@ mod batch;
 #[path = "faults/clock.rs"]
 mod clock;
 #[cfg(target_os = "linux")]
+#[path = "faults/every_step.rs"]
+mod every_step;
+#[cfg(target_os = "linux")]
 #[path = "faults/forbidden.rs"]
 mod forbidden;
 #[cfg(target_os = "linux")]

@@ -19,12 +19,13 @@ impl Nobody {
     fn new(sandbox: &Sandbox) -> Option<Self> {
         // Temporary folders are their maker's alone.
         fs::set_permissions(sandbox.path("."), Permissions::from_mode(0o755)).expect("scratch");
+        // So is, maybe, the folder that the program lies in.
+        fs::copy(env!("CARGO_BIN_EXE_trajc"), sandbox.path("trajc")).expect("scratch");
         let probe = sandbox.path("probe");
         fs::create_dir(&probe).expect("scratch");
         fs::set_permissions(&probe, Permissions::from_mode(0o555)).expect("scratch");
         let bound = |before: &[&str]| {
-            let touch =
-                [before, &["sh", "-c", "\"$0\" --version && ! touch probe/a", env!("CARGO_BIN_EXE_trajc")]].concat();
+            let touch = [before, &["sh", "-c", "./trajc --version && ! touch probe/a"]].concat();
             Command::new(touch[0])
                 .args(&touch[1..])
                 .current_dir(sandbox.path("."))
@@ -33,7 +34,7 @@ impl Nobody {
         };
         let ways = [&["env"][..], &["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"]];
         let way = ways.into_iter().find(|way| bound(way));
-        fs::remove_dir(&probe).expect("scratch");
+        fs::remove_dir_all(&probe).expect("scratch");
         if way.is_none() {
             eprintln!("SKIPPED: permissions bind nobody here: folders that may not be written to are not tried");
         }
@@ -43,7 +44,7 @@ impl Nobody {
     /// Exit code and messages.
     fn run(&self, sandbox: &Sandbox, args: &[&str]) -> (Option<i32>, String) {
         let mut command = Command::new(self.before[0]);
-        command.args(&self.before[1..]).arg(env!("CARGO_BIN_EXE_trajc")).args(args).current_dir(sandbox.path("."));
+        command.args(&self.before[1..]).arg("./trajc").args(args).current_dir(sandbox.path("."));
         let output = command.env("COLUMNS", "400").stdin(Stdio::null()).output().expect("the program starts");
         (output.status.code(), String::from_utf8(output.stderr).expect("text"))
     }
@@ -111,7 +112,7 @@ fn files_that_may_not_be_written_to_are_replaced_in_output_folders_and_kept_else
     let Some(nobody) = Nobody::new(&sandbox) else { return };
     build(&sandbox, 1);
     write_missions(&sandbox, 1, false);
-    give(&sandbox.path("."));
+    give(&sandbox.path("out"));
     for file in sandbox.list("out/a") {
         forbid(&sandbox.path(&format!("out/a/{file}")));
     }
@@ -120,6 +121,8 @@ fn files_that_may_not_be_written_to_are_replaced_in_output_folders_and_kept_else
     assert_eq!(leftovers(&sandbox.path("out")), [""; 0]);
     sandbox.write("drawing.svg", "mine");
     forbid(&sandbox.path("drawing.svg"));
+    // Others could be put in its place.
+    fs::set_permissions(sandbox.path("."), Permissions::from_mode(0o777)).expect("scratch");
     let (code, stderr) = nobody.run(&sandbox, &["inspect", "missions/a.yaml", "--plot", "drawing.svg"]);
     assert_eq!(code, Some(2), "{stderr}");
     assert!(stderr.contains("cannot write `drawing.svg`: Permission denied"), "{stderr}");
