@@ -117,7 +117,7 @@ pub fn build(args: &BuildArgs, terminal: &mut Terminal) -> Result<u8, Diagnostic
         let schedule = Schedule::new(jobs);
         let site = Site { args: &args.products, start, making, hashes: hashes.clone(), schedule };
         compile(args, &site, total, &missions, &mut rows, terminal);
-        hashes.save(out);
+        hashes.save();
     }
     let code = rows.iter().map(|row| row.exit_code).max().unwrap_or_default();
     let document = Document::new(out.clone(), args.dry_run, code, rows);

@@ -67,11 +67,14 @@ fn killed_at_any_instant_each_mission_is_whole_or_absent_and_the_next_build_make
     // Bad input in version 1: what is there of it is removed.
     let started = Instant::now();
     let versions = [reference(&sandbox, 0, false), reference(&sandbox, 1, true)];
-    let lasts = started.elapsed().as_micros() as u64 / 3;
+    let mut lasts = started.elapsed().as_micros() as u64 / 3;
     let mut random = Random(9);
     let mut version = 1;
     let mut figures = Figures::default();
-    for round in 0..rounds {
+    for round in 0.. {
+        if figures.kills == rounds {
+            break;
+        }
         // A first build, all anew, all changed, some missing.
         let mut args = vec!["build", "-k", "-j", "2"];
         match random.below(4) {
@@ -90,8 +93,12 @@ fn killed_at_any_instant_each_mission_is_whole_or_absent_and_the_next_build_make
         let mut running =
             trajc(&sandbox, &args).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program starts");
         std::thread::sleep(Duration::from_micros(random.below(lasts)));
-        figures.kills += 1;
-        figures.too_late += u32::from(running.try_wait().expect("a child").is_some());
+        if running.try_wait().expect("a child").is_none() {
+            figures.kills += 1;
+        } else {
+            figures.too_late += 1;
+            lasts = lasts * 9 / 10;
+        }
         running.kill().expect("a child");
         running.wait().expect("a child");
 
