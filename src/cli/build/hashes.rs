@@ -9,7 +9,7 @@ use std::fs::{self, Metadata};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, SystemTime};
+use std::time::{Duration, UNIX_EPOCH};
 
 use blake3::Hash;
 
@@ -36,7 +36,7 @@ struct Stamp {
 impl Stamp {
     fn of(found: &Metadata) -> Option<Self> {
         let modified = found.modified().ok()?;
-        let modified_ns = match modified.duration_since(std::time::UNIX_EPOCH) {
+        let modified_ns = match modified.duration_since(UNIX_EPOCH) {
             Ok(after) => i128::try_from(after.as_nanos()).ok()?,
             Err(before) => -i128::try_from(before.duration().as_nanos()).ok()?,
         };
@@ -215,16 +215,17 @@ pub fn sweep(out: &Path) {
     let _ = fs::remove_file(out.join(UNFINISHED));
 }
 
-/// When a file was written to last. What decides is the time that nobody can set: files copied with their dates look old.
+/// How long ago a file was written to. What decides is the time that nobody can set: files copied with their dates look old. `None`:
+/// in a time yet to come.
 #[cfg(unix)]
-fn written(found: &Metadata) -> Option<SystemTime> {
-    let (changed_ns, _) = changed(found);
-    SystemTime::UNIX_EPOCH.checked_add(Duration::from_nanos(u64::try_from(changed_ns).ok()?))
+fn age(found: &Metadata) -> Option<Duration> {
+    let written = Duration::from_nanos(u64::try_from(changed(found).0).ok()?);
+    UNIX_EPOCH.elapsed().ok()?.checked_sub(written)
 }
 
 #[cfg(not(unix))]
-fn written(found: &Metadata) -> Option<SystemTime> {
-    found.modified().ok()
+fn age(found: &Metadata) -> Option<Duration> {
+    found.modified().ok()?.elapsed().ok()
 }
 
 /// The stamp of a file that was not written to within the last tick of the clock; waits where it was. A time yet to come (the clock was
@@ -232,8 +233,7 @@ fn written(found: &Metadata) -> Option<SystemTime> {
 fn settled(path: &Path) -> io::Result<Option<Stamp>> {
     regular(path)?;
     let found = fs::metadata(path)?;
-    let age = written(&found).and_then(|written| written.elapsed().ok());
-    match age.and_then(|age| TICK.checked_sub(age)) {
+    match age(&found).and_then(|age| TICK.checked_sub(age)) {
         // It may have been written to while we waited; then the next build sees another stamp and reads it.
         Some(rest) => {
             std::thread::sleep(rest);
@@ -305,7 +305,7 @@ mod tests {
     fn a_change_within_a_tick_of_the_clock_is_seen_whatever_date_the_file_is_given() {
         let folder = scratch();
         let file = folder.path().join("a");
-        for date in [SystemTime::UNIX_EPOCH + 300 * TICK, SystemTime::now() + Duration::from_secs(1 << 30)] {
+        for date in [UNIX_EPOCH + 300 * TICK, std::time::SystemTime::now() + Duration::from_secs(1 << 30)] {
             for _ in 0..5 {
                 let put = |text: &str| {
                     fs::write(&file, text).expect("scratch");
