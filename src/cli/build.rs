@@ -89,6 +89,7 @@ pub fn build(args: &BuildArgs, terminal: &mut Terminal) -> Result<u8, Diagnostic
         output::make_folder(out)?;
         let lock = output::lock_all(out)?;
         output::sweep(out);
+        hashes::sweep(out);
         lock
     };
     let hashes = Arc::new(Hashes::load(&start, out));
@@ -116,7 +117,7 @@ pub fn build(args: &BuildArgs, terminal: &mut Terminal) -> Result<u8, Diagnostic
         let schedule = Schedule::new(jobs);
         let site = Site { args: &args.products, start, making, hashes: hashes.clone(), schedule };
         compile(args, &site, total, &missions, &mut rows, terminal);
-        hashes.save(out);
+        hashes.save();
     }
     let code = rows.iter().map(|row| row.exit_code).max().unwrap_or_default();
     let document = Document::new(out.clone(), args.dry_run, code, rows);
@@ -253,11 +254,12 @@ fn finish(
         Ok(made) => {
             let status = if finished.certified() { RowStatus::Certified } else { RowStatus::Failed };
             row.end(status, made.ended.clone());
-            made.diagnostics.as_ref()
+            made.diagnostics.clone()
         }
         Err(faults) => {
+            let mut faults = faults.clone();
             // Also where it panicked.
-            site.discard(mission);
+            site.discard(mission, &mut faults);
             row.status = RowStatus::Failed;
             row.failure = faults.0.first().map(|first| Reason {
                 code: first.code.to_owned(),
@@ -267,10 +269,10 @@ fn finish(
         }
     };
     if let Some(faults) = faults {
-        row.exit_code = super::exit_code(faults);
+        row.exit_code = super::exit_code(&faults);
         progress.aside(|| {
             terminal.remark(&format!("{}: FAILED\n", mission.path.display()));
-            terminal.complain(faults);
+            terminal.complain(&faults);
         });
     }
 }

@@ -101,13 +101,12 @@ pub fn main() -> u8 {
             Ok(0)
         }
     };
-    match result {
-        Ok(code) => code,
-        Err(diagnostics) => {
-            terminal.complain(&diagnostics);
-            exit_code(&diagnostics)
-        }
+    let mut code = *result.as_ref().unwrap_or(&0);
+    for diagnostics in result.err().into_iter().chain(terminal.lost()) {
+        terminal.complain(&diagnostics);
+        code = code.max(exit_code(&diagnostics));
     }
+    code
 }
 
 fn size(text: &str) -> Result<u64, &'static str> {

@@ -1,10 +1,10 @@
 //! Where results and diagnostics go: results to stdout, diagnostics and progress to stderr.
 
-use std::io::{IsTerminal, Write};
+use std::io::{self, IsTerminal, Write};
 
 use indicatif::ProgressBar;
 
-use crate::diag::{Diagnostics, render};
+use crate::diag::{Diagnostic, Diagnostics, render};
 
 /// The user's terminal, or the pipe in its place.
 pub struct Terminal {
@@ -14,6 +14,8 @@ pub struct Terminal {
     pub colour_results: bool,
     /// Asked for no progress (`--quiet`).
     pub quiet: bool,
+    /// Why a result is not all there.
+    lost: Option<io::Error>,
 }
 
 impl Terminal {
@@ -24,12 +26,26 @@ impl Terminal {
             colour: wanted && std::io::stderr().is_terminal(),
             colour_results: wanted && std::io::stdout().is_terminal(),
             quiet: false,
+            lost: None,
         }
     }
 
-    /// A result. A reader that has gone away is no error of ours.
+    /// A result. A reader that has gone away is no error of ours; that it cannot be written is told at the end ([`Terminal::lost`]).
     pub fn print(&mut self, text: &str) {
-        let _ = std::io::stdout().write_all(text.as_bytes());
+        let mut stdout = std::io::stdout().lock();
+        match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+            Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+                self.lost.get_or_insert(error);
+            }
+            _ => {}
+        }
+    }
+
+    /// What is wrong with a result that was not printed to its end: a full disk, where stdout is a file.
+    pub fn lost(&mut self) -> Option<Diagnostics> {
+        let error = self.lost.take()?;
+        let fault = Diagnostic::error("output/stdout", format!("cannot write the result to stdout: {error}"));
+        Some(fault.hint("what was printed is not all there: make room where it goes, or send it elsewhere").into())
     }
 
     /// A remark on how it goes, beside the result: to stderr, unless it is to be quiet.

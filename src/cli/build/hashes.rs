@@ -1,14 +1,15 @@
 //! Hashes of files, each file looked at once a build, and read only where it may have changed.
 //!
 //! What decides is a file's BLAKE3. A file whose size, times and inode are as they were when it was hashed is not read again; so that
-//! this holds across builds, `out/.trajc-build` keeps them. It is a cache: without it everything is hashed once.
+//! this holds across builds, `out/.trajc-build` keeps them. It is a cache: without it everything is hashed once. What a build writes
+//! is noted there at once and not held, so that memory does not grow with the number of missions.
 
 use std::collections::BTreeMap;
 use std::fs::{self, Metadata};
-use std::io;
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, UNIX_EPOCH};
 
 use blake3::Hash;
 
@@ -16,6 +17,8 @@ use crate::cli::inputs::{regular, tidy};
 
 /// The cache's file in the output folder.
 pub const CACHE: &str = ".trajc-build";
+/// What it is called until it is whole.
+const UNFINISHED: &str = ".trajc-build.new";
 /// First line of that file.
 const HEAD: &str = "trajc.hashes/1";
 /// Two changes within this time may leave a file with the same times: clocks of file systems tick that slowly.
@@ -33,7 +36,7 @@ struct Stamp {
 impl Stamp {
     fn of(found: &Metadata) -> Option<Self> {
         let modified = found.modified().ok()?;
-        let modified_ns = match modified.duration_since(std::time::UNIX_EPOCH) {
+        let modified_ns = match modified.duration_since(UNIX_EPOCH) {
             Ok(after) => i128::try_from(after.as_nanos()).ok()?,
             Err(before) => -i128::try_from(before.duration().as_nanos()).ok()?,
         };
@@ -66,12 +69,43 @@ struct Inner {
     known: BTreeMap<PathBuf, Known>,
     /// Something to be kept for the next build.
     dirty: bool,
+    /// The next build's cache, as far as it is written: what this one has made.
+    notes: Option<Notes>,
+}
+
+/// The cache while it is being written. Of two lines of one file the later one counts.
+struct Notes(io::Result<BufWriter<fs::File>>);
+
+impl Notes {
+    fn begin(out: &Path) -> Self {
+        // One build at a time has the folder, so the name is nobody else's.
+        let mut notes = Self(fs::File::create(out.join(UNFINISHED)).map(BufWriter::new));
+        notes.line(HEAD);
+        notes
+    }
+
+    /// What cannot be written is found at the end.
+    fn line(&mut self, line: &str) {
+        if let Ok(file) = &mut self.0
+            && let Err(error) = writeln!(file, "{line}")
+        {
+            self.0 = Err(error);
+        }
+    }
+
+    fn add(&mut self, path: &Path, stamp: &Stamp, hash: &Hash) {
+        let Some(name) = path.to_str().filter(|name| !name.contains('\n')) else { return };
+        let Stamp { size, modified_ns, changed_ns, inode } = stamp;
+        self.line(&format!("{} {size} {modified_ns} {changed_ns} {inode} {name}", hash.to_hex()));
+    }
 }
 
 /// Hashes of files by their absolute paths. Shared by all workers.
 pub struct Hashes {
     /// What relative paths are relative to.
     start: PathBuf,
+    /// Where they are kept.
+    out: PathBuf,
     inner: Mutex<Inner>,
 }
 
@@ -79,7 +113,8 @@ impl Hashes {
     /// With what the builds before left in the output folder.
     pub fn load(start: &Path, out: &Path) -> Self {
         let known = fs::read_to_string(out.join(CACHE)).map(|text| parse(&text)).unwrap_or_default();
-        Self { start: start.to_path_buf(), inner: Mutex::new(Inner { known, dirty: false }) }
+        let inner = Mutex::new(Inner { known, dirty: false, notes: None });
+        Self { start: start.to_path_buf(), out: start.join(out), inner }
     }
 
     fn inner(&self) -> MutexGuard<'_, Inner> {
@@ -129,8 +164,12 @@ impl Hashes {
 
     /// Notes the hash of a file that this build has written.
     pub fn wrote(&self, path: &Path, hash: Hash) {
-        let stamp = fs::metadata(path).ok().and_then(|found| Stamp::of(&found));
-        self.remember(self.key(path), stamp, hash);
+        let Some(stamp) = fs::metadata(path).ok().and_then(|found| Stamp::of(&found)) else { return };
+        let key = self.key(path);
+        let mut inner = self.inner();
+        // As it was before.
+        inner.known.remove(&key);
+        inner.notes.get_or_insert_with(|| Notes::begin(&self.out)).add(&key, &stamp, &hash);
     }
 
     /// The known hash, if the stamp is as it was.
@@ -150,33 +189,51 @@ impl Hashes {
     }
 
     /// Keeps what is known for the next build, but for files that are gone. That it cannot be kept is no error: it is a cache.
-    pub fn save(&self, out: &Path) {
+    pub fn save(&self) {
         let mut inner = self.inner();
-        if !std::mem::take(&mut inner.dirty) {
+        let dirty = std::mem::take(&mut inner.dirty) || inner.notes.is_some();
+        if !dirty {
             return;
         }
-        let mut text = format!("{HEAD}\n");
+        let mut notes = inner.notes.take().unwrap_or_else(|| Notes::begin(&self.out));
         for (path, Known { stamp, hash, looked }) in &inner.known {
-            let Some(name) = path.to_str().filter(|name| !name.contains('\n')) else { continue };
             if *looked || path.exists() {
-                let Stamp { size, modified_ns, changed_ns, inode } = stamp;
-                text += &format!("{} {size} {modified_ns} {changed_ns} {inode} {name}\n", hash.to_hex());
+                notes.add(path, stamp, hash);
             }
         }
-        // One build at a time has the folder, so the name is nobody else's.
-        let new = out.join(format!("{CACHE}.new"));
-        if fs::write(&new, text).is_ok() {
-            let _ = fs::rename(&new, out.join(CACHE));
+        let unfinished = self.out.join(UNFINISHED);
+        let written = notes.0.and_then(|mut file| file.flush());
+        if written.and_then(|()| fs::rename(&unfinished, self.out.join(CACHE))).is_err() {
+            // Half of it may be there, and take the last room on a disk.
+            let _ = fs::remove_file(&unfinished);
         }
     }
 }
 
-/// The stamp of a file that was not written to within the last tick of the clock; waits where it was.
+/// Removes what a build left that was killed while it kept its hashes.
+pub fn sweep(out: &Path) {
+    let _ = fs::remove_file(out.join(UNFINISHED));
+}
+
+/// How long ago a file was written to. What decides is the time that nobody can set: files copied with their dates look old. `None`:
+/// in a time yet to come.
+#[cfg(unix)]
+fn age(found: &Metadata) -> Option<Duration> {
+    let written = Duration::from_nanos(u64::try_from(changed(found).0).ok()?);
+    UNIX_EPOCH.elapsed().ok()?.checked_sub(written)
+}
+
+#[cfg(not(unix))]
+fn age(found: &Metadata) -> Option<Duration> {
+    found.modified().ok()?.elapsed().ok()
+}
+
+/// The stamp of a file that was not written to within the last tick of the clock; waits where it was. A time yet to come (the clock was
+/// set back) is none that a change made now could have.
 fn settled(path: &Path) -> io::Result<Option<Stamp>> {
     regular(path)?;
     let found = fs::metadata(path)?;
-    let age = found.modified().ok().and_then(|modified| modified.elapsed().ok());
-    match age.and_then(|age| TICK.checked_sub(age)) {
+    match age(&found).and_then(|age| TICK.checked_sub(age)) {
         // It may have been written to while we waited; then the next build sees another stamp and reads it.
         Some(rest) => {
             std::thread::sleep(rest);
@@ -217,7 +274,7 @@ mod tests {
         let first = Hashes::load(folder.path(), folder.path());
         assert_eq!(first.hash(Path::new("a b.txt")).expect("there"), blake3::hash(b"one"));
         first.hash(&other).expect("there");
-        first.save(folder.path());
+        first.save();
         fs::remove_file(&other).expect("scratch");
 
         let second = Hashes::load(folder.path(), folder.path());
@@ -227,7 +284,7 @@ mod tests {
         fs::write(&file, "two").expect("scratch");
         let third = Hashes::load(folder.path(), folder.path());
         assert_eq!(third.hash(&file).expect("there"), blake3::hash(b"two"), "same size, other time");
-        third.save(folder.path());
+        third.save();
         let kept = fs::read_to_string(folder.path().join(CACHE)).expect("kept");
         assert!(kept.contains("a b.txt") && !kept.contains("other"), "{kept}");
     }
@@ -242,6 +299,27 @@ mod tests {
         fs::write(&file, "two").expect("scratch");
         assert_eq!(hashes.hash(&file).expect("there"), blake3::hash(b"one"));
         assert_eq!(hashes.read(&file).expect("there"), (b"two".to_vec(), blake3::hash(b"two")));
+    }
+
+    #[test]
+    fn a_change_within_a_tick_of_the_clock_is_seen_whatever_date_the_file_is_given() {
+        let folder = scratch();
+        let file = folder.path().join("a");
+        for date in [UNIX_EPOCH + 300 * TICK, std::time::SystemTime::now() + Duration::from_secs(1 << 30)] {
+            for _ in 0..5 {
+                let put = |text: &str| {
+                    fs::write(&file, text).expect("scratch");
+                    fs::File::options().write(true).open(&file).and_then(|f| f.set_modified(date)).expect("a date");
+                };
+                put("one");
+                let first = Hashes::load(folder.path(), folder.path());
+                assert_eq!(first.hash(&file).expect("there"), blake3::hash(b"one"));
+                put("two");
+                first.save();
+                let second = Hashes::load(folder.path(), folder.path());
+                assert_eq!(second.hash(&file).expect("there"), blake3::hash(b"two"));
+            }
+        }
     }
 
     #[test]

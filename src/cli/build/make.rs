@@ -56,13 +56,19 @@ impl Site<'_> {
     /// # Errors
     /// Bad input, or the folder cannot be written; older files of the mission are then removed.
     pub fn make(&self, job: &Job, mission: &Found) -> Result<Made, Diagnostics> {
-        self.compile(job, mission).inspect_err(|_| self.discard(mission))
+        self.compile(job, mission).map_err(|mut faults| {
+            self.discard(mission, &mut faults);
+            faults
+        })
     }
 
-    /// Removes what is left of a mission, commands above all.
-    pub fn discard(&self, mission: &Found) {
-        // Where they cannot be removed they could not be replaced either, and the reason is told already.
-        let _ = output::discard(&self.args.out, &mission.name);
+    /// Removes what is left of a mission, commands above all; adds to what is wrong with it that they cannot be removed.
+    pub fn discard(&self, mission: &Found, faults: &mut Diagnostics) {
+        if let Err(error) = output::discard(&self.args.out, &mission.name) {
+            // It may be why nothing could be written, too.
+            let more = Diagnostics::from(error).0.into_iter().filter(|d| !faults.0.contains(d));
+            faults.0.extend(more.collect::<Vec<_>>());
+        }
     }
 
     fn compile(&self, job: &Job, mission: &Found) -> Result<Made, Diagnostics> {

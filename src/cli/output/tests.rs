@@ -163,7 +163,7 @@ fn leftovers_of_killed_runs_are_cleared_but_not_those_of_running_ones() {
     s.put(".a.trajc-3.new/commands.csv", "of a run that goes on");
     s.put(".b.trajc-4.new/commands.csv", "another mission's");
     s.put("a/commands.csv", "newer");
-    let running = lock(&s.out().join(".a.trajc-3.new")).expect("nobody else holds it");
+    let running = leftovers::lock(&s.out().join(".a.trajc-3.new")).expect("nobody else holds it");
     publish(&s.out(), "a", NEW).expect("room");
     assert_eq!(s.names(""), [".a.trajc-3.new", ".b.trajc-4.new", "a"]);
     assert_eq!(s.names("a"), ["commands.csv", "notes.txt", "report.json"], "what was foreign is saved");
@@ -181,6 +181,48 @@ fn a_run_killed_between_the_renames_loses_no_foreign_file() {
     publish(&s.out(), "a", NEW).expect("room");
     assert_eq!((s.names(""), s.text("a/notes.txt")), (vec!["a".to_string()], "mine".to_string()));
     assert_eq!(s.text("a/commands.csv"), "new");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_run_killed_while_it_removed_files_leaves_nothing_of_ours_and_all_that_is_not() {
+    let s = Scratch::new();
+    for (mission, killed) in [("a", "2"), ("b", "3")] {
+        s.put(&format!(".{mission}.trajc-{killed}.gone/was/commands.mcap"), "old");
+        s.put(&format!(".{mission}.trajc-{killed}.gone/was/notes.txt"), "mine");
+    }
+    s.put("b/commands.csv", "newer");
+    s.put(".c.trajc-4.gone/was/report.html", "old");
+    sweep(&s.out());
+    assert_eq!((s.names(""), s.names("a")), (vec!["a".to_string(), "b".to_string()], vec!["notes.txt".to_string()]));
+    assert_eq!(s.names("b"), ["commands.csv", "notes.txt"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn runs_that_write_and_remove_the_same_folder_at_the_same_time_all_end_well() {
+    let s = Scratch::new();
+    s.put("a/notes.txt", "mine");
+    let sets: Vec<String> = (0..3).map(|k| format!("set {k}")).collect();
+    std::thread::scope(|scope| {
+        for set in &sets {
+            let out = s.out();
+            scope.spawn(move || {
+                for round in 0..30 {
+                    let files = [("commands.csv", set.as_bytes()), ("report.json", set.as_bytes())];
+                    publish(&out, "a", &files).unwrap_or_else(|error| panic!("{set}, {round}: {error}"));
+                }
+            });
+        }
+        let out = s.out();
+        scope.spawn(move || (0..60).for_each(|_| sweep(&out)));
+    });
+    sweep(&s.out());
+    assert_eq!(
+        (s.names(""), s.names("a")),
+        (vec!["a".into()], vec!["commands.csv".into(), "notes.txt".into(), "report.json".into()])
+    );
+    assert_eq!(s.text("a/commands.csv"), s.text("a/report.json"));
 }
 
 #[cfg(unix)]
