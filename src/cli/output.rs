@@ -31,7 +31,7 @@ pub const FILES: [&str; 10] = [
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
     /// The system says no.
-    #[error("cannot {action} {}: {error}", path.display())]
+    #[error("cannot {action} `{}`: {}", path.display(), reason(error))]
     Io {
         /// What was tried.
         action: &'static str,
@@ -44,7 +44,7 @@ pub enum OutputError {
     #[error("`{0}` is no name for a folder of results")]
     Name(String),
     /// Something else has the folder's name.
-    #[error("{} is not a folder", .0.display())]
+    #[error("`{}` is not a folder, as results need", .0.display())]
     NotAFolder(PathBuf),
 }
 
@@ -60,6 +60,18 @@ impl Describe for OutputError {
             }
         }
     }
+}
+
+/// The system's words, without its number for them; of what is most often wrong, ours.
+fn reason(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::NotFound => return "its folder is not there".into(),
+        io::ErrorKind::AlreadyExists => return "a file of that name is there".into(),
+        io::ErrorKind::NotADirectory => return "a file stands where a folder must be".into(),
+        _ => {}
+    }
+    let words = error.to_string();
+    words.split(" (os error").next().unwrap_or(&words).to_owned()
 }
 
 /// Adds action and path to a system's error.
@@ -288,7 +300,7 @@ pub(super) fn lock_all(out: &Path) -> Result<Option<File>, Diagnostics> {
 /// It cannot be made.
 pub(super) fn make_folder(path: &Path) -> Result<(), Diagnostics> {
     std::fs::create_dir_all(path).map_err(|error| {
-        let message = format!("cannot make folder `{}`: {error}", path.display());
+        let message = format!("cannot make folder `{}`: {}", path.display(), reason(&error));
         Diagnostic::error("output/io", message).hint("the folder above must be writable").into()
     })
 }
@@ -299,7 +311,7 @@ pub(super) fn make_folder(path: &Path) -> Result<(), Diagnostics> {
 /// It cannot be written.
 pub(super) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Diagnostics> {
     std::fs::write(path, bytes).map_err(|error| {
-        let message = format!("cannot write `{}`: {error}", path.display());
+        let message = format!("cannot write `{}`: {}", path.display(), reason(&error));
         Diagnostic::error("output/io", message).hint("the folder must exist and be writable").into()
     })
 }
