@@ -17,7 +17,7 @@ use std::time::Instant;
 
 use crate::certify::{self, Certificate, Demands, Goal, RefusalKind, Task, Trust, Via};
 use crate::command::{self, CommandTable, SampleOptions};
-use crate::diag::{Diagnostic, Diagnostics};
+use crate::diag::{Describe, Diagnostic, Diagnostics};
 use crate::geom::{Pose2, wrap_angle};
 use crate::map::VoxelMap;
 use crate::mission::{Mission, Parameterisation, PathSpec, PoseSpec, TimeLaw, Tolerance};
@@ -286,7 +286,10 @@ fn stages(
     }
     if !certificate.holds() {
         run.traces.refused = Some(commands);
-        return Err(refused(&certificate, trajectory.source).into());
+        // A given path is what is wrong with the mission then; otherwise no line is.
+        let spans = &mission.spans;
+        let path = spans.path_file.as_ref().or(spans.path.as_ref());
+        return Err(refused(&certificate, trajectory.source).maybe_at(path).into());
     }
     if !mission.path_error_times.is_empty() {
         let rows = run.stage("path_error", || {
@@ -342,7 +345,8 @@ impl Finish<'_> {
     ) -> Result<(MotionProfile, CommandTable), Diagnostics> {
         let options = RetimeOptions { law: self.law(trajectory), sampling_time: self.sampling_time };
         let profile =
-            run.stage("retime", || retime::retime_in(trajectory, self.robot, &options, self.mission.speed_zones()))?;
+            run.stage("retime", || retime::retime_in(trajectory, self.robot, &options, self.mission.speed_zones()));
+        let profile = profile.map_err(|error| error.diagnostic().maybe_at(self.mission.spans.time_law.as_ref()))?;
         let options = SampleOptions { sampling_time: self.sampling_time, sampling: self.mission.sampling };
         let commands = run.stage("command", || command::sample(&profile, self.robot, &options))?;
         Ok((profile, commands))
@@ -473,11 +477,15 @@ fn given_path(
         .map(|j| start.joints.get(&j.name).copied().unwrap_or(0f64.clamp(j.lower, j.upper)))
         .collect();
     let trajectory = match (path, csv) {
-        (PathSpec::Bezier(segments), _) => given::from_bezier(segments, &held)?,
+        (PathSpec::Bezier(segments), _) => given::from_bezier(segments, &held)
+            .map_err(|error| Diagnostics::from(error.diagnostic().maybe_at(mission.spans.path.as_ref())))?,
         (PathSpec::File(_), Some(csv)) => given::from_csv(&csv.name, &csv.text, robot, &held)?,
         (PathSpec::File(file), None) => {
             let message = format!("path file `{}` was not read", file.display());
-            return Err(Diagnostic::error("mission/path-not-read", message).into());
+            return Err(Diagnostic::error("mission/path-not-read", message)
+                .maybe_at(mission.spans.path_file.as_ref())
+                .hint("give its text along with the mission's")
+                .into());
         }
     };
     let (first, _) = start_of(&trajectory);

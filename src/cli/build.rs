@@ -48,7 +48,7 @@ pub struct BuildArgs {
     #[arg(value_name = "PATH", default_value = "missions")]
     paths: Vec<PathBuf>,
     /// Missions to compile at a time [default: one for each core].
-    #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, short, value_name = "N", value_parser = at_a_time)]
     jobs: Option<u16>,
     /// Go on with other missions where one fails.
     #[arg(long, short)]
@@ -64,6 +64,10 @@ pub struct BuildArgs {
     /// Print JSON on stdout instead of the table (`trajc schema build`).
     #[arg(long)]
     json: bool,
+}
+
+fn at_a_time(text: &str) -> Result<u16, String> {
+    super::whole(text, 1, 1024).map(|n| n as u16)
 }
 
 /// What is known of a mission before anything is compiled.

@@ -54,7 +54,10 @@ pub struct CalibrateArgs {
 const NOTHING: f64 = 1e-7;
 
 fn positive(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|v| (1e-9..=1e3).contains(v)).ok_or_else(|| "expected a number above 0".to_owned())
+    text.parse()
+        .ok()
+        .filter(|v| (1e-9..=1e3).contains(v))
+        .ok_or_else(|| "expected a number above 0, such as 0.005".to_owned())
 }
 
 /// Calibrates.
@@ -66,7 +69,8 @@ pub fn calibrate(args: &CalibrateArgs, terminal: &mut Terminal) -> Result<u8, Di
     let name = args.log.display().to_string();
     let (spec, yaml, urdf) = read_robot_files(&args.robot, &disk, None)?;
     let Some(yaml) = yaml else {
-        let fault = Diagnostic::error("calibrate/urdf", format!("`{}` is a URDF", args.robot.display()));
+        let fault =
+            Diagnostic::error("calibrate/urdf", format!("`{}` is a URDF, expected a robot.yaml", args.robot.display()));
         return Err(fault.hint("write a robot.yaml for it: trajc robot init FILE.urdf --out robot.yaml").into());
     };
     let (model, drive) = robot::parse_with_drive(RobotInputs {
@@ -85,9 +89,10 @@ pub fn calibrate(args: &CalibrateArgs, terminal: &mut Terminal) -> Result<u8, Di
     })?;
     let new = calibrate::rewrite(&yaml.name, &yaml.text, &fit).map_err(|error| match error {
         RewriteError::Yaml(faults) => faults,
-        RewriteError::NotATable(key) => {
-            Diagnostic::error("calibrate/robot", format!("`{key}` is no table")).file(&yaml.name).into()
-        }
+        RewriteError::NotATable(key) => Diagnostic::error("calibrate/robot", format!("`{key}` is no table"))
+            .file(&yaml.name)
+            .hint("write it as `key: value` pairs")
+            .into(),
     })?;
     let text = if args.json { json(&fit, guess) } else { readable(&fit, guess) };
     terminal.print(&text);
@@ -118,13 +123,13 @@ fn read_log(
     let is_bag = args.log.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"));
     if !is_bag {
         let text = disk.text(&args.log, None)?.text;
-        return calibrate::read_csv(&text).map_err(|error| fault(error.to_string()).into());
+        return Ok(calibrate::read_csv(&name, &text)?);
     }
     let bytes = disk.binary(&args.log, None)?;
     let topics = Topics { wheels: &args.wheels, poses: args.poses.as_deref(), base_frame: args.base_frame.as_deref() };
     calibrate::read_mcap(&bytes, model, drive, topics).map_err(|error: BagError| {
         let fault = fault(error.to_string());
-        error.hint().into_iter().fold(fault, |fault, hint| fault.hint(hint)).into()
+        fault.hint(error.hint().unwrap_or("record it again, with `ros2 bag record -s mcap`")).into()
     })
 }
 

@@ -42,7 +42,7 @@ pub struct EvalArgs {
     robot: Option<PathBuf>,
     /// Scenes for each number of boxes, or kind of room [default: the paper's 500, 200 or 120]; of a file: the first N [default: all];
     /// of trust: cases in all [default: 1400].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    #[arg(long, value_name = "N", value_parser = count)]
     count: Option<u32>,
     /// Seed of a suite [default: 1].
     #[arg(long, value_name = "SEED", conflicts_with = "scenes")]
@@ -52,7 +52,7 @@ pub struct EvalArgs {
     scene: Option<u64>,
     /// Boxes a scene, for table3 [default: 10,20,35].
     #[arg(long, value_name = "N", value_delimiter = ',', conflicts_with = "scenes",
-          value_parser = clap::value_parser!(u16).range(1..=60))]
+          value_parser = boxes)]
     boxes: Vec<u16>,
     /// What the optimiser's polynomials are of [default: as in a mission that does not say].
     #[arg(long, value_name = "WHAT")]
@@ -74,6 +74,14 @@ pub struct EvalArgs {
     /// Print figures as JSON instead of tables.
     #[arg(long)]
     json: bool,
+}
+
+fn count(text: &str) -> Result<u32, String> {
+    super::whole(text, 1, 10_000_000).map(|n| n as u32)
+}
+
+fn boxes(text: &str) -> Result<u16, String> {
+    super::whole(text, 1, 60).map(|n| n as u16)
 }
 
 /// What `--suite` names.
@@ -162,7 +170,7 @@ pub fn eval(args: &EvalArgs, terminal: &mut Terminal) -> Result<u8, Diagnostics>
         set.limits.joints.retain(|name, _| own.joints.iter().any(|j| j.name == *name));
     }
     let loaded = Loaded::new(files, &set, &disk)?;
-    set.fits(&loaded.robot)?;
+    set.fits(&loaded.robot, &text.text)?;
     if let Some(path) = &args.write_scenes {
         output::write_file(path, text.text.as_bytes())?;
     }
@@ -245,7 +253,7 @@ fn scenes(args: &EvalArgs, disk: &Disk) -> Result<(SceneSet, TextFile), Diagnost
 
 fn generate(args: &EvalArgs, suite: Suite, count: usize, disk: &Disk) -> Result<String, Diagnostics> {
     if suite.is_figure() && (args.seed.is_some() || args.count.is_some()) {
-        let message = format!("{} is one fixed scene: there is nothing to count or to draw", suite.name());
+        let message = format!("{} is one fixed scene: `--count` and `--seed` have no meaning", suite.name());
         return Err(Diagnostic::error("eval/fixed", message).hint("leave `--count` and `--seed` out").into());
     }
     if !args.boxes.is_empty() && suite != Suite::Table3 {

@@ -119,7 +119,7 @@ fn of_map(args: &InspectArgs, path: &Path) -> Result<Understood, Diagnostics> {
         [low, high] if low.is_finite() && high.is_finite() && low < high => [low, high],
         _ => {
             let written: Vec<String> = args.height.iter().map(f64::to_string).collect();
-            let message = format!("--height {} is no slab", written.join(","));
+            let message = format!("--height {} is no slab: expected LOW,HIGH", written.join(","));
             let hint = "give two ends in metres, the lower first, such as --height 0.02,2";
             return Err(Diagnostic::error("inspect/height", message).hint(hint).into());
         }

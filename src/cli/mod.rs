@@ -109,8 +109,14 @@ pub fn main() -> u8 {
     code
 }
 
+/// A whole number on the command line.
+fn whole(text: &str, least: u64, most: u64) -> Result<u64, String> {
+    let number = text.parse().ok().filter(|n| (least..=most).contains(n));
+    number.ok_or_else(|| format!("expected a whole number from {least} to {most}, such as {}", least.max(2)))
+}
+
 fn size(text: &str) -> Result<u64, &'static str> {
-    memory::parse(text).ok_or("a size of at least 1 MiB, such as 512MiB or 8GB")
+    memory::parse(text).ok_or("expected a size of at least 1 MiB, such as 512MiB or 8GB")
 }
 
 fn exit_code(diagnostics: &Diagnostics) -> u8 {

@@ -42,7 +42,7 @@ pub const FILES: [&str; 10] = [
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
     /// The system says no.
-    #[error("cannot {action} {}: {error}", path.display())]
+    #[error("cannot {action} `{}`: {}", path.display(), reason(error))]
     Io {
         /// What was tried.
         action: &'static str,
@@ -55,7 +55,7 @@ pub enum OutputError {
     #[error("`{0}` is no name for a folder of results")]
     Name(String),
     /// Something else has the folder's name.
-    #[error("{} is not a folder", .0.display())]
+    #[error("`{}` is not a folder, as results need", .0.display())]
     NotAFolder(PathBuf),
 }
 
@@ -81,6 +81,18 @@ fn room(error: &io::Error) -> Option<String> {
         _ => return None,
     };
     Some(hint.to_owned())
+}
+
+/// The system's words, without its number for them; of what is most often wrong, ours.
+fn reason(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::NotFound => return "its folder is not there".into(),
+        io::ErrorKind::AlreadyExists => return "a file of that name is there".into(),
+        io::ErrorKind::NotADirectory => return "a file stands where a folder must be".into(),
+        _ => {}
+    }
+    let words = error.to_string();
+    words.split(" (os error").next().unwrap_or(&words).to_owned()
 }
 
 /// Adds action and path to a system's error.

@@ -10,7 +10,7 @@ use super::output::write_file;
 use super::plot;
 use super::products::seconds;
 use super::terminal::Terminal;
-use crate::diag::{Diagnostic, Diagnostics};
+use crate::diag::{Diagnostic, Diagnostics, nearest};
 use crate::emit::csv;
 use crate::mission::Sampling;
 use crate::pipeline::{self, CompileOptions};
@@ -109,7 +109,10 @@ pub fn path_error(args: &PathErrorArgs, terminal: &mut Terminal) -> Result<u8, D
 fn sampling(text: &str) -> Result<Sampling, String> {
     let known = [Sampling::Tracked, Sampling::Mean, Sampling::Instant];
     let found = known.into_iter().find(|known| names::sampling(*known) == text);
-    found.ok_or_else(|| "expected tracked, mean or instant".to_owned())
+    found.ok_or_else(|| {
+        let near = nearest(text, known.map(names::sampling)).unwrap_or("tracked");
+        format!("expected tracked, mean or instant, such as {near}")
+    })
 }
 
 /// A length on the command line, m.

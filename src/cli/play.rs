@@ -72,7 +72,8 @@ fn rate(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (0.001..=1.0).contains(&value) => Ok(value),
         Ok(value) if value > 1.0 => {
-            Err("faster than planned would exceed the limits that were proven; compile again for a faster motion"
+            Err("faster than planned would exceed the limits that were proven: compile again for a faster motion; expected at most 1, \
+                 such as 0.5"
                 .to_owned())
         }
         _ => Err("expected a number above 0 and at most 1, such as 0.5".to_owned()),

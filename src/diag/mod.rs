@@ -108,6 +108,12 @@ impl Diagnostic {
         self
     }
 
+    /// Adds what to do, where nothing better was said.
+    pub fn or_hint(mut self, hint: impl Into<String>) -> Self {
+        self.hint.get_or_insert_with(|| hint.into());
+        self
+    }
+
     /// Adds a number for `report.json`.
     pub fn number(mut self, key: &'static str, value: impl Into<serde_json::Value>) -> Self {
         self.numbers.push((key, value.into()));
@@ -172,6 +178,23 @@ pub fn nearest<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
         .filter(|(meant, _, _)| *meant)
         .min_by_key(|(_, distance, _)| *distance)
         .map(|(_, _, name)| name)
+}
+
+/// What to do about a name that is not known: the nearest that is, or else those that are. `are`: how the list of them begins,
+/// such as `known keys are`; `none`: what to say where there are none.
+pub fn suggestion<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>, are: &str, none: &str) -> String {
+    const MOST: usize = 12;
+    let known: Vec<&str> = known.into_iter().collect();
+    if let Some(near) = nearest(wrong, known.iter().copied()) {
+        return format!("did you mean `{near}`?");
+    }
+    if known.is_empty() {
+        return none.to_owned();
+    }
+    let shown: Vec<String> = known.iter().take(MOST).map(|name| format!("`{name}`")).collect();
+    let more = known.len().saturating_sub(MOST);
+    let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
+    format!("{are} {}{rest}", shown.join(", "))
 }
 
 /// Letters to insert, remove, replace or swap with their neighbour.

@@ -119,12 +119,17 @@ pub(super) fn spelling(text: &str, shape: &Shape) -> Option<String> {
     let digits = text.trim_end_matches(|c: char| !c.is_ascii_digit() && c != '.');
     let unit = text[digits.len()..].trim();
     let number = plain_number(digits)?;
+    let metres = matches!(shape, Shape::Number(Bounds { unit: "m", .. }));
     Some(match unit {
         "deg" | "°" | "degrees" | "degree" | "Deg" | "DEG" if angle => format!("write `{digits}deg`, without a space"),
         "%" if matches!(shape, Shape::Share(_)) => format!("write `{digits}%`, without a space"),
         "deg" | "°" | "degrees" | "degree" => {
             format!("no degrees here; in radians it is `{:.6}`", number.to_radians())
         }
+        "mm" if metres => format!("write metres: `{}`", number / 1e3),
+        "cm" if metres => format!("write metres: `{}`", number / 1e2),
+        "m" if metres => format!("metres are written without a unit: `{digits}`"),
+        "%" => "no percent here: write the number alone, in the unit that the key says".into(),
         "rad" if angle => format!("radians are written without a unit: `{digits}`"),
         _ => "write the number alone, in the unit that the key says".into(),
     })

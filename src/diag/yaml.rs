@@ -12,6 +12,7 @@ use serde_saphyr::budget::BudgetBreach;
 use serde_saphyr::options::{DuplicateKeyPolicy, NonFiniteFloatPolicy, Options};
 use serde_saphyr::{Error, Location, MessageFormatter, Spanned, UserMessageFormatter};
 
+use super::words::shorten;
 use super::{Diagnostic, Diagnostics, Source, Span};
 
 /// Deepest nesting of maps and lists. Our own files need six levels.
@@ -335,7 +336,10 @@ fn explain(error: &Error, source: &Arc<Source>) -> Diagnostic {
                 .hint("one file is one document: remove the `---` line and what follows it")
         }
         Error::UnknownAnchor { .. } => {
-            Diagnostic::error("yaml/syntax", "this alias (`*name`) has no anchor (`&name`) before it")
+            let rest = source.text.get(range.start..).unwrap_or_default();
+            let alias = rest.split([' ', ',', ']', '}', '\n', '\r']).next().unwrap_or_default();
+            let name = alias.trim_start_matches('*');
+            Diagnostic::error("yaml/syntax", format!("the alias `*{name}` has no anchor `&{name}` before it"))
                 .hint("put text that begins with `*` in quotes")
         }
         Error::UnsupportedTag { tag, .. } => {
@@ -343,16 +347,92 @@ fn explain(error: &Error, source: &Arc<Source>) -> Diagnostic {
                 .hint("remove it; put text that begins with `!` in quotes")
         }
         other => {
-            let message = UserMessageFormatter.format_message(other);
-            Diagnostic::error("yaml/syntax", format!("not valid YAML: {message}"))
-                .hint(if ["mapping values", "simple key expected"].iter().any(|m| message.contains(m)) {
-                    "a key is written `key: value`, with a colon and a space: look for one without, or for wrong indentation"
-                } else {
-                    "look at this line and the one before it: indentation (spaces, no tabs), brackets, quotes, `key: value`"
-                })
+            return syntax(&UserMessageFormatter.format_message(other), source, range);
         }
     };
     diagnostic.at(&Span::new(source, range))
+}
+
+/// The first tab in the indentation of a line from here on.
+fn tab_in_indentation(text: &str, from: usize) -> Option<usize> {
+    let mut at = from;
+    text[from..].split_inclusive('\n').find_map(|line| {
+        let indentation = line.len() - line.trim_start_matches([' ', '\t']).len();
+        let found = line[..indentation].find('\t').map(|tab| at + tab);
+        at += line.len();
+        found
+    })
+}
+
+/// The last quote before this place in a line where it is not closed.
+fn open_quote(text: &str, before: usize) -> Option<usize> {
+    let mut end = text[before..].find('\n').map_or(text.len(), |i| before + i);
+    loop {
+        let start = text[..end].rfind('\n').map_or(0, |i| i + 1);
+        let line = &text[start..end];
+        let open = ['"', '\''].into_iter().find(|quote| line.matches(*quote).count() % 2 == 1);
+        if let Some(at) = open.and_then(|quote| line.rfind(quote)) {
+            return Some(start + at);
+        }
+        end = start.checked_sub(1)?;
+    }
+}
+
+/// The parser's words for a syntax error, in those of who wrote the file.
+fn syntax(words: &str, source: &Arc<Source>, range: Range<usize>) -> Diagnostic {
+    let text = source.text.as_str();
+    let line_at = |at: usize| {
+        let start = text[..at].rfind('\n').map_or(0, |i| i + 1);
+        (start, text[start..].lines().next().unwrap_or_default())
+    };
+    let (_, line) = line_at(range.start);
+    let shown = shorten(line.trim());
+    let character = text[range.start..].chars().next().map_or("the end of the file".into(), |c| format!("`{c}`"));
+    let is = |part: &str| words.contains(part);
+    // The parser may be ahead of, or behind, what it stumbles over.
+    let tab = if is("tab") { tab_in_indentation(text, line_at(range.start).0) } else { None };
+    let quote = if is("quote") { open_quote(text, range.start) } else { None };
+    let (message, hint, range) = if let Some(at) = tab {
+        (
+            "found a tab in the indentation, expected spaces".into(),
+            "indent with spaces: YAML allows no tabs there",
+            at..at + 1,
+        )
+    } else if let Some(at) = quote {
+        let hint = "close the quote in the line where it is opened";
+        (
+            format!("the quote in `{}` does not end, expected another one", shorten(line_at(at).1.trim())),
+            hint,
+            at..at + 1,
+        )
+    } else if is("simple key expected") || is("could not find expected ':'") {
+        let hint = "a key is written `key: value`, with a colon and a space";
+        (format!("`{shown}` is no `key: value` line"), hint, range)
+    } else if is("mapping values") {
+        let hint =
+            "indent a key as far as the other keys of its table, with spaces; put text that has `: ` in it in quotes";
+        (
+            format!("no key can be where `{shown}` has its colon; expected keys of one table to be indented alike"),
+            hint,
+            range,
+        )
+    } else if is("did not find expected ',' or") {
+        let close = if is("sequence") { "]" } else { "}" };
+        let hint = "close the brackets that are opened in this line or before it, and put commas between entries";
+        (format!("found {character}, expected `,` or `{close}`"), hint, range)
+    } else if is("did not find expected key") {
+        let hint = "indent a key as far as the other keys of its table, with spaces";
+        (
+            format!("`{shown}` is indented otherwise than the keys before it, expected like the lines beside it"),
+            hint,
+            range,
+        )
+    } else {
+        let hint =
+            "look at this line and the one before it: indentation (spaces, no tabs), brackets, quotes, `key: value`";
+        (format!("{words}, found {character}"), hint, range)
+    };
+    Diagnostic::error("yaml/syntax", format!("not valid YAML: {message}")).at(&Span::new(source, range)).hint(hint)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::csv::{CsvHeader, FORMAT, joint_columns};
 use crate::command::{CommandRow, CommandTable};
-use crate::diag::{Diagnostic, Diagnostics, Source, Span, nearest};
+use crate::diag::{Diagnostic, Diagnostics, Source, Span, nearest, suggestion};
 use crate::geom::Pose2;
 use crate::report::names;
 use crate::robot::{LARGEST_DIFFERENCE, WheelRadii};
@@ -34,6 +34,17 @@ const KEYS: [&str; 10] = [
     "inputs_blake3",
 ];
 const OPTIONAL: [&str; 2] = ["map", "wheel_difference"];
+
+/// What to do with a file that is none of ours.
+const WRITTEN: &str = "commands.csv is written by `trajc compile`";
+/// What to do with a file that ends too early.
+const CUT: &str =
+    "was the file cut off? behind its head it has a line of column names, time_s,wheel_left_rad_s,…, and rows";
+
+/// The columns that every file has.
+fn needed() -> String {
+    format!("needed are {}; joints have joint.NAME.pos_rad and .vel_rad_s, or .pos_m and .vel_mps", FIXED.join(", "))
+}
 
 /// A command file's table and head. `name` is the file's path as the user knows it.
 ///
@@ -96,7 +107,7 @@ struct Head {
 
 /// Where the columns are.
 struct Columns {
-    count: usize,
+    names: Vec<String>,
     fixed: [usize; FIXED.len()],
     joints: Vec<JointColumns>,
 }
@@ -113,28 +124,37 @@ impl Reader<'_> {
         &self.source.text[range.clone()]
     }
 
-    fn fault(&mut self, code: &'static str, message: String, range: Range<usize>) {
-        self.fault_hint(code, message, range, None);
+    fn fault(&mut self, code: &'static str, message: String, range: Range<usize>, hint: impl Into<String>) {
+        if self.faults.len() < FAULTS {
+            let fault = Diagnostic::error(code, message).at(&Span::new(self.source, range));
+            self.faults.push(fault.hint(hint));
+        }
     }
 
-    fn fault_hint(&mut self, code: &'static str, message: String, range: Range<usize>, hint: Option<String>) {
-        if self.faults.len() < FAULTS {
-            let mut fault = Diagnostic::error(code, message).at(&Span::new(self.source, range));
-            fault.hint = hint;
-            self.faults.push(fault);
-        }
+    /// The range of cell `k` of a line.
+    fn cell(&self, line: &Range<usize>, k: usize) -> Range<usize> {
+        let mut at = line.start;
+        let cells = self.text(line).split(',').map(|cell| {
+            let start = at + (cell.len() - cell.trim_start().len());
+            at += cell.len() + 1;
+            start..start + cell.trim().len()
+        });
+        cells.into_iter().nth(k).unwrap_or_else(|| line.clone())
     }
 
     fn read(&mut self) -> Option<(CommandTable, CsvHeader)> {
         if self.lines.is_empty() {
-            self.fault("commands/format", "this is no command file: it is empty".into(), 0..0);
+            self.fault("commands/format", "this is no command file: it is empty".into(), 0..0, WRITTEN);
             return None;
         }
         let notes = self.lines.iter().take_while(|l| self.text(l).starts_with('#')).count();
         let head = self.head(notes);
+        if self.faults.iter().any(|fault| fault.code == "commands/format") {
+            return None;
+        }
         let Some(names) = self.lines.get(notes).cloned() else {
             let end = self.source.text.len();
-            self.fault("commands/no-columns", "the file ends before the column names".into(), end..end);
+            self.fault("commands/no-columns", "the file ends before the column names".into(), end..end, CUT);
             return None;
         };
         let columns = self.columns(names)?;
@@ -150,7 +170,7 @@ impl Reader<'_> {
         let mut last = f64::NEG_INFINITY;
         let before = self.faults.len();
         for i in notes + 1..self.lines.len() {
-            let cells = self.cells(i, columns.count);
+            let cells = self.cells(i, &columns.names);
             if self.faults.len() >= FAULTS {
                 break;
             }
@@ -161,28 +181,41 @@ impl Reader<'_> {
         }
         if table.rows.is_empty() && self.faults.len() == before {
             let end = self.source.text.len();
-            self.fault("commands/no-rows", "the file has no row".into(), end..end);
+            self.fault("commands/no-rows", "the file has no row below the column names".into(), end..end, CUT);
         }
         Some((table, head.header))
     }
 
     fn head(&mut self, notes: usize) -> Option<Head> {
         let mut found: Vec<(&'static str, String, Range<usize>)> = Vec::new();
+        // Keys whose lines are told to be wrong: that they are missing is no news.
+        let mut told: Vec<&str> = Vec::new();
         for i in 0..notes {
             let range = self.lines[i].clone();
             let line = self.text(&range)[1..].to_string();
             let Some((key, value)) = line.split_once(':') else {
-                self.fault("commands/head", "a line of the head must be `# key: value`".into(), range);
+                let word = line.split_whitespace().next().unwrap_or_default();
+                told.extend(KEYS.iter().find(|key| **key == word));
+                let message =
+                    format!("a line of the head must be `# key: value`, found `{}`", self.text(&range).trim_end());
+                self.fault(
+                    "commands/head",
+                    message,
+                    range,
+                    "a colon separates key and value; a command file has no other comments",
+                );
                 continue;
             };
             let (key, value) = (key.trim(), value.trim().to_string());
             match KEYS.iter().find(|known| **known == key) {
                 None => {
-                    let hint = nearest(key, KEYS).map(|known| format!("did you mean `{known}`?"));
-                    self.fault_hint("commands/head", format!("unknown key `{key}`"), range, hint);
+                    let hint = suggestion(key, KEYS, "known keys are", "");
+                    told.extend(nearest(key, KEYS));
+                    self.fault("commands/head", format!("unknown key `{key}` in the head"), range, hint);
                 }
                 Some(known) if found.iter().any(|(k, ..)| k == known) => {
-                    self.fault("commands/head", format!("`{key}` is given twice"), range);
+                    let message = format!("`{key}` is given twice in the head");
+                    self.fault("commands/head", message, range, "keep one of the two lines");
                 }
                 Some(known) => found.push((known, value, range)),
             }
@@ -191,23 +224,24 @@ impl Reader<'_> {
         let is_ours = |value: &String| value == FORMAT;
         match found.iter().find(|(key, ..)| *key == "format").cloned() {
             None => {
-                let hint = Some("commands.csv is written by `trajc compile`".to_string());
                 let message = format!("this is no command file: no line `# format: {FORMAT}` at its top");
                 // What follows from that is no news.
                 self.faults.clear();
-                self.fault_hint("commands/format", message, top, hint);
+                self.fault("commands/format", message, top, WRITTEN);
                 return None;
             }
             Some((_, value, range)) if !is_ours(&value) => {
                 self.faults.clear();
-                self.fault("commands/format", format!("format is `{value}`, this program reads `{FORMAT}`"), range);
+                let message = format!("format is `{value}`, this program reads `{FORMAT}`");
+                self.fault("commands/format", message, range, "compile it again with this version of trajc");
                 return None;
             }
             Some(_) => {}
         }
-        for key in KEYS.into_iter().filter(|key| !OPTIONAL.contains(key)) {
+        for key in KEYS.into_iter().filter(|key| !OPTIONAL.contains(key) && !told.contains(key)) {
             if !found.iter().any(|(k, ..)| *k == key) {
-                self.fault("commands/head", format!("the head has no `# {key}: …`"), top.clone());
+                let hint = "add it as the file had it when `trajc compile` wrote it, or compile again";
+                self.fault("commands/head", format!("the head has no `# {key}: …`"), top.clone(), hint);
             }
         }
         let get =
@@ -220,7 +254,7 @@ impl Reader<'_> {
                 let share = value.parse::<f64>().ok().filter(|share| share.abs() <= LARGEST_DIFFERENCE);
                 if share.is_none() {
                     let message = format!("wheel_difference is `{value}`, must be a share from -0.1 to 0.1");
-                    self.fault("commands/head", message, range);
+                    self.fault("commands/head", message, range, "write the share as the file had it, such as 0.002");
                 }
                 share
             }
@@ -231,7 +265,8 @@ impl Reader<'_> {
             let sampling = names::parse_sampling(&value);
             if sampling.is_none() {
                 let known = names::SAMPLINGS.map(|(_, name)| name).join(", ");
-                self.fault("commands/head", format!("sampling is `{value}`, must be one of {known}"), range);
+                let hint = suggestion(&value, names::SAMPLINGS.map(|(_, name)| name), "samplings are", "");
+                self.fault("commands/head", format!("sampling is `{value}`, must be one of {known}"), range, hint);
             }
             sampling
         });
@@ -252,7 +287,9 @@ impl Reader<'_> {
     fn positive(&mut self, key: &str, (value, range): (String, Range<usize>)) -> Option<f64> {
         let number = value.parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0);
         if number.is_none() {
-            self.fault("commands/head", format!("{key} is `{value}`, must be a number above 0"), range);
+            let unit = if key.ends_with("_s") { "seconds" } else { "metres" };
+            let message = format!("{key} is `{value}`, must be a number above 0");
+            self.fault("commands/head", message, range, format!("write it in {unit}, such as `# {key}: 0.1`"));
         }
         number
     }
@@ -267,39 +304,50 @@ impl Reader<'_> {
         let before = self.faults.len();
         let mut joints: Vec<JointColumns> = Vec::new();
         for (at, name) in names.iter().enumerate() {
+            let place = self.cell(&range, at);
             if names[..at].contains(name) {
-                self.fault("commands/column", format!("column `{name}` is there twice"), range.clone());
+                let message = format!("column `{name}` is there twice");
+                self.fault("commands/column", message, place, "remove one of the two columns");
             } else if let Some((joint, prismatic)) = position_column(name) {
                 let [_, velocity] = joint_columns(joint, prismatic);
                 let found = names.iter().position(|n| *n == velocity);
                 match found {
-                    None => self.fault("commands/column", format!("no column `{velocity}`"), range.clone()),
+                    None => {
+                        let message = format!("column `{name}` is there without `{velocity}`");
+                        self.fault(
+                            "commands/column",
+                            message,
+                            place,
+                            "a joint has two columns, its position and speed: add the other",
+                        );
+                    }
                     Some(_) if joints.iter().any(|j| j.name == joint) => {
                         self.fault(
                             "commands/column",
                             format!("joint `{joint}` has columns in rad and in m"),
-                            range.clone(),
+                            place,
+                            "a joint turns (rad) or slides (m): remove the others",
                         );
                     }
                     Some(velocity) => {
                         joints.push(JointColumns { name: joint.to_string(), prismatic, position: at, velocity })
                     }
                 }
-            } else if !FIXED.contains(&name.as_str()) && !self.known_velocity(name, &names, &range) {
-                let hint = nearest(name, FIXED).map(|known| format!("did you mean `{known}`?"));
-                self.fault_hint("commands/column", format!("unknown column `{name}`"), range.clone(), hint);
+            } else if !FIXED.contains(&name.as_str()) && !self.known_velocity(name, &names, &place) {
+                let hint = nearest(name, FIXED).map_or_else(needed, |known| format!("did you mean `{known}`?"));
+                self.fault("commands/column", format!("unknown column `{name}`"), place, hint);
             }
         }
         let fixed = FIXED.map(|name| {
             names.iter().position(|n| n == name).unwrap_or_else(|| {
                 // An unknown column that is near to it was told with that hint; once is enough.
                 if !names.iter().any(|n| !FIXED.contains(&n.as_str()) && nearest(n, FIXED) == Some(name)) {
-                    self.fault("commands/column", format!("no column `{name}`"), range.clone());
+                    self.fault("commands/column", format!("no column `{name}`"), range.clone(), needed());
                 }
                 0
             })
         });
-        (self.faults.len() == before).then_some(Columns { count: names.len(), fixed, joints })
+        (self.faults.len() == before).then_some(Columns { names, fixed, joints })
     }
 
     /// Whether this is a joint's velocity; without its position column that is a fault of its own.
@@ -309,7 +357,9 @@ impl Reader<'_> {
             if let Some(joint) = rest.strip_suffix(suffix).filter(|joint| !joint.is_empty()) {
                 let [position, _] = joint_columns(joint, prismatic);
                 if !names.contains(&position) {
-                    self.fault("commands/column", format!("no column `{position}`"), range.clone());
+                    let message = format!("column `{name}` is there without `{position}`");
+                    let hint = "a joint has two columns, its position and speed: add the other";
+                    self.fault("commands/column", message, range.clone(), hint);
                 }
                 return true;
             }
@@ -318,7 +368,8 @@ impl Reader<'_> {
     }
 
     /// The finite numbers of line `i`.
-    fn cells(&mut self, i: usize, count: usize) -> Option<Vec<f64>> {
+    fn cells(&mut self, i: usize, names: &[String]) -> Option<Vec<f64>> {
+        let count = names.len();
         let range = self.lines[i].clone();
         let mut at = range.start;
         let mut ranges = Vec::with_capacity(count);
@@ -328,17 +379,19 @@ impl Reader<'_> {
         }
         if ranges.len() != count {
             let message = format!("the row has {} cells, the header {count}", ranges.len());
-            self.fault("commands/row", message, range);
+            let hint = "a row has one cell for each column; was the file cut off or edited?";
+            self.fault("commands/row", message, range, hint);
             return None;
         }
         let mut values = Vec::with_capacity(count);
-        for range in ranges {
+        for (k, range) in ranges.into_iter().enumerate() {
             let cell = self.text(&range).trim();
             match cell.parse::<f64>() {
                 Ok(value) if value.is_finite() => values.push(value),
                 _ => {
                     let message = format!("`{cell}` is no finite number");
-                    self.fault("commands/number", message, range);
+                    let hint = format!("column `{}` needs one in every row", names[k]);
+                    self.fault("commands/number", message, range, hint);
                     return None;
                 }
             }
@@ -360,13 +413,19 @@ impl Reader<'_> {
         let wanted = table.time(k);
         if time <= *last {
             let message = format!("time_s does not increase: {time} s after {last} s");
-            self.fault("commands/time", message, range.clone());
+            self.fault(
+                "commands/time",
+                message,
+                self.cell(&range, columns.fixed[0]),
+                "rows follow each other in time, `sampling_time_s` apart",
+            );
         } else if (time - wanted).abs() > TIME_TOLERANCE {
             let message = format!(
                 "time_s is {time} s, row {k} of a file sampled each {} s is at {wanted} s",
                 table.sampling_time
             );
-            self.fault("commands/time", message, range.clone());
+            let hint = "rows are `sampling_time_s` of the head apart, from 0 on: none may be missing";
+            self.fault("commands/time", message, self.cell(&range, columns.fixed[0]), hint);
         }
         *last = time;
         let (held_v, held_omega) = table.twist(k);
@@ -376,8 +435,8 @@ impl Reader<'_> {
                 let message = format!(
                     "{name} is {said}, but the wheels of this row (wheel_left_rad_s {left}, wheel_right_rad_s {right}) give {held}"
                 );
-                let fault =
-                    Diagnostic::error("commands/contradiction", message).at(&Span::new(self.source, range.clone()));
+                let at = columns.names.iter().position(|n| n == name).map_or(range.clone(), |k| self.cell(&range, k));
+                let fault = Diagnostic::error("commands/contradiction", message).at(&Span::new(self.source, at));
                 self.contradictions.push(fault.hint("the wheels are what is driven; twists must follow from them"));
             }
         }

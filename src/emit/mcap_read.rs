@@ -71,10 +71,10 @@ impl CommandFile {
 #[derive(Debug, thiserror::Error)]
 pub enum McapReadError {
     /// Other bytes.
-    #[error("this is no MCAP file")]
+    #[error("this is no MCAP file: it does not begin with `\\x89MCAP0`")]
     NotMcap,
     /// It ends too early.
-    #[error("the MCAP file is cut short")]
+    #[error("the MCAP file is cut short: it does not end as MCAP files end")]
     CutShort,
     /// A checksum or a record is wrong.
     #[error("the MCAP file is damaged: {0}")]
@@ -151,7 +151,9 @@ pub enum McapReadError {
 impl Describe for McapReadError {
     fn diagnostic(&self) -> Diagnostic {
         match self {
-            Self::NotMcap => Diagnostic::error("commands/not-mcap", self),
+            Self::NotMcap => {
+                Diagnostic::error("commands/not-mcap", self).hint("commands.mcap is written by `trajc compile`")
+            }
             Self::CutShort => Diagnostic::error("commands/cut-short", self).hint("copy or compile it again"),
             Self::Damaged(_) | Self::Overrun => {
                 Diagnostic::error("commands/damaged", self).hint("copy or compile it again")
@@ -161,12 +163,16 @@ impl Describe for McapReadError {
             Self::Foreign => {
                 Diagnostic::error("commands/foreign", self).hint("commands.mcap is written by `trajc compile`")
             }
-            Self::Format(_) => Diagnostic::error("commands/format", self),
-            Self::Head { .. } => Diagnostic::error("commands/head", self),
+            Self::Format(_) => {
+                Diagnostic::error("commands/format", self).hint("compile it again with this version of trajc")
+            }
+            Self::Head { .. } => Diagnostic::error("commands/head", self).hint("compile it again"),
             Self::Count { .. } | Self::Message { .. } | Self::Content { .. } => {
                 Diagnostic::error("commands/message", self)
+                    .hint("the file was changed after it was written: compile it again")
             }
-            Self::Contradiction { .. } => Diagnostic::error("commands/contradiction", self),
+            Self::Contradiction { .. } => Diagnostic::error("commands/contradiction", self)
+                .hint("topics of one file must say the same: compile it again"),
         }
     }
 }

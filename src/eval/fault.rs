@@ -1,8 +1,12 @@
 //! What can be wrong with a file of scenes, by the place in its tree.
 
+use std::ops::Range;
+use std::sync::Arc;
+
 use super::json::shortened;
+use super::place::places;
 use super::scenes::SCHEMA;
-use crate::diag::{Describe, Diagnostic, Diagnostics, nearest};
+use crate::diag::{Describe, Diagnostic, Diagnostics, Source, Span, nearest, suggestion};
 
 /// No more faults than this are collected from one file.
 pub(super) const MOST: usize = 100;
@@ -11,8 +15,15 @@ pub(super) const MOST: usize = 100;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ScenesError {
     /// Not JSON.
-    #[error("not JSON: {0}")]
-    Syntax(String),
+    #[error("not JSON: {fault}, found {found}")]
+    Syntax {
+        /// What the parser says.
+        fault: String,
+        /// What stands there.
+        found: String,
+        /// Byte.
+        at: usize,
+    },
     /// Another kind of file.
     #[error("`schema` is {found}, expected \"{SCHEMA}\"")]
     Schema {
@@ -106,9 +117,10 @@ pub enum ScenesError {
 impl Describe for ScenesError {
     fn diagnostic(&self) -> Diagnostic {
         match self {
-            Self::Syntax(_) => {
-                Diagnostic::error("scenes/syntax", self).hint("the format is JSON, not YAML or JSON lines")
-            }
+            Self::Syntax { .. } => Diagnostic::error("scenes/syntax", self).hint(
+                "JSON has keys in quotes, a comma between two entries and none behind the last, and every bracket closed: was the \
+                 file cut off?",
+            ),
             Self::Schema { .. } => Diagnostic::error("scenes/schema", self)
                 .hint(format!("scenes begin with {{\"schema\": \"{SCHEMA}\", …")),
             Self::Missing { example, .. } => {
@@ -122,25 +134,76 @@ impl Describe for ScenesError {
                 Diagnostic::error("scenes/unknown-key", self).hint(hint)
             }
             Self::RepeatedKey { .. } => Diagnostic::error("scenes/repeated-key", self).hint("keep one of the two"),
-            Self::Kind { .. } => Diagnostic::error("scenes/wrong-type", self),
-            Self::Range { .. } => Diagnostic::error("scenes/out-of-range", self),
+            Self::Kind { path, .. } => Diagnostic::error("scenes/wrong-type", self).hint(like(path)),
+            Self::Range { path, .. } => Diagnostic::error("scenes/out-of-range", self).hint(like(path)),
             Self::UpsideDown { .. } => Diagnostic::error("scenes/upside-down", self).hint("`min` before `max`"),
             Self::Id { .. } => Diagnostic::error("scenes/id", self).hint(
                 "1 to 100 letters, digits, `-`, `_` and `.`, not beginning with `.`: commands are written to DIR/ID",
             ),
             Self::RepeatedId { .. } => Diagnostic::error("scenes/repeated-id", self).hint("give each scene its own id"),
-            Self::UnknownJoint { known, .. } => {
-                let hint = match known.is_empty() {
-                    true => "this robot has no moving joint; `--robot` chooses another".to_owned(),
-                    false => format!("moving joints: {}", known.join(", ")),
-                };
+            Self::UnknownJoint { path, known, .. } => {
+                let none = "this robot has no moving joint; `--robot` chooses another";
+                let name = path.rsplit('.').next().unwrap_or_default();
+                let hint = suggestion(name, known.iter().map(String::as_str), "its moving joints are", none);
                 Diagnostic::error("scenes/unknown-joint", self).hint(hint)
             }
         }
     }
 }
 
+/// An example for what has this path.
+fn like(path: &str) -> String {
+    let key = path.rsplit('.').next().unwrap_or_default();
+    let key = key.split('[').next().unwrap_or_default();
+    let example = match key {
+        "bounds" => "\"bounds\": [[0, 0, 0], [10, 10, 1]], in metres: the lower corner, then the upper one",
+        "resolution" => "\"resolution\": 0.05, the size of a cell in metres",
+        "clearance_m" => "\"clearance_m\": 0.05, in metres",
+        "limits" => "\"limits\": {\"base\": {\"eta\": 0.4}}",
+        "reverse" => "\"reverse\": true",
+        "seed" => "\"seed\": 1",
+        "name" => "\"name\": \"mine\"",
+        "id" => "\"id\": \"scene-7\"",
+        "kind" => "\"kind\": \"hall\"",
+        "boxes" => "\"boxes\": [{\"min\": [1, 1, 0], \"max\": [1.6, 1.6, 0.4]}]",
+        "min" => "\"min\": [1, 1, 0], in metres",
+        "max" => "\"max\": [1.6, 1.6, 0.4], in metres",
+        "x" | "y" | "yaw" | "start" | "goal" => "{\"x\": 0.5, \"y\": 0.5, \"yaw\": 0.0}, in metres and radians",
+        "joints" => "\"joints\": {\"lift\": 0.1}, in radians or metres",
+        "scenes" => "\"scenes\": [{\"id\": \"a\", …}], at least one",
+        _ => "a number within these bounds",
+    };
+    format!("for example {example}")
+}
+
+impl ScenesError {
+    /// Where it is in the text.
+    fn place(&self, text: &str) -> Range<usize> {
+        let at = |path: &str| places(text, path, super::read::join);
+        let value = |path: &str| at(path).into_iter().next().map(|place| place.value);
+        let key = |path: &str| at(path).into_iter().next_back().map(|place| place.key.unwrap_or(place.value));
+        let found = match self {
+            Self::Syntax { at, .. } => Some(*at..*at + text[*at..].chars().next().map_or(0, char::len_utf8)),
+            Self::Schema { .. } => value("schema"),
+            // Of what is missing, the table that lacks it.
+            Self::Missing { path, .. } => {
+                let table = path.rsplit_once('.').map_or("", |(table, _)| table);
+                value(table).map(|range| range.start..range.start + 1)
+            }
+            Self::UnknownKey { path, .. } | Self::RepeatedKey { path } | Self::UnknownJoint { path, .. } => key(path),
+            Self::Kind { path, .. } if path == "the document" => value(""),
+            Self::Kind { path, .. }
+            | Self::Range { path, .. }
+            | Self::UpsideDown { path, .. }
+            | Self::Id { path, .. }
+            | Self::RepeatedId { path, .. } => value(path),
+        };
+        found.unwrap_or(0..0)
+    }
+}
+
 /// Faults of one file, for the user.
-pub(super) fn diagnostics(file: &str, faults: &[ScenesError]) -> Diagnostics {
-    Diagnostics(faults.iter().map(|f| f.diagnostic().file(file)).collect())
+pub(super) fn diagnostics(file: &str, text: &str, faults: &[ScenesError]) -> Diagnostics {
+    let source = Arc::new(Source { name: file.to_owned(), text: text.to_owned() });
+    Diagnostics(faults.iter().map(|f| f.diagnostic().at(&Span::new(&source, f.place(text)))).collect())
 }

@@ -18,6 +18,7 @@ mod json;
 mod judge;
 pub mod paper;
 mod picture;
+mod place;
 mod read;
 mod rng;
 mod room;

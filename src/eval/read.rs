@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use super::fault::{self, ScenesError};
 use super::json::{Json, shortened};
+use super::place::places;
 use super::scenes::{SCHEMA, Scene, SceneSet};
 use crate::diag::shape::{Field, LARGE, Shape};
-use crate::diag::{Diagnostic, Diagnostics, Source, shape, yaml};
+use crate::diag::{Describe, Diagnostic, Diagnostics, Source, Span, nearest, shape, yaml};
 use crate::geom::Aabb;
 use crate::map::VoxelMap;
 use crate::mission::{LimitsSpec, PoseSpec, Unknown, limits};
@@ -36,16 +37,19 @@ static LIMITS: [Field; 1] =
 /// keys, values of the wrong type or out of range, boxes upside down, ids that are no folder's name or not distinct, a grid
 /// that is too large.
 pub fn read(file: &str, text: &str) -> Result<SceneSet, Diagnostics> {
-    let fail = |fault: ScenesError| fault::diagnostics(file, &[fault]);
     if text.len() > LONGEST {
-        let found = format!("{} bytes", text.len());
-        return Err(fail(ScenesError::Range { path: file.into(), range: format!("at most {LONGEST} bytes"), found }));
+        let fault = ScenesError::Range {
+            path: file.into(),
+            range: format!("at most {LONGEST} bytes"),
+            found: format!("{} bytes", text.len()),
+        };
+        return Err(fault.diagnostic().file(file).hint("split the file: scenes do not depend on each other").into());
     }
-    let tree: Json = serde_json::from_str(text.trim_start_matches('\u{feff}'))
-        .map_err(|e| fail(ScenesError::Syntax(e.to_string())))?;
+    let fail = |fault: ScenesError| fault::diagnostics(file, text, &[fault]);
+    let tree: Json = serde_json::from_str(text.trim_start_matches('\u{feff}')).map_err(|e| fail(syntax(text, &e)))?;
     let mut reader = Reader { faults: Vec::new(), others: Vec::new() };
-    let set = reader.document(file, &tree);
-    let mut all = fault::diagnostics(file, &reader.faults);
+    let set = reader.document(file, text, &tree);
+    let mut all = fault::diagnostics(file, text, &reader.faults);
     all.0.extend(reader.others);
     let Some(set) = set.filter(|_| all.0.is_empty()) else { return Err(all) };
     if let Some((i, id)) = set.repeated_id() {
@@ -54,10 +58,37 @@ pub fn read(file: &str, text: &str) -> Result<SceneSet, Diagnostics> {
     // Too large a grid is refused before the first scene, not in its midst.
     VoxelMap::from_boxes(set.bounds, set.resolution, &[], Unknown::Occupied).map_err(|mut diagnostics| {
         let hint = "choose a larger `resolution` or smaller `bounds`";
-        diagnostics.0.iter_mut().for_each(|d| (d.file, d.hint) = (Some(file.into()), Some(hint.into())));
+        let source = Arc::new(Source { name: file.into(), text: text.into() });
+        let bounds = places(text, "bounds", join).into_iter().next().map_or(0..0, |place| place.value);
+        let at = Span::new(&source, bounds);
+        diagnostics.0.iter_mut().for_each(|d| (d.at, d.hint) = (Some(at.clone()), Some(hint.into())));
         diagnostics
     })?;
     Ok(set)
+}
+
+/// What the JSON parser says, without its line and column, which become a place.
+fn syntax(text: &str, error: &serde_json::Error) -> ScenesError {
+    let words = error.to_string();
+    let mut fault = words.split(" at line ").next().unwrap_or_default().to_owned();
+    let end = text.trim_end().len();
+    if error.is_eof() {
+        let (within, close) = match fault.rsplit(' ').next() {
+            Some("object") => ("an object", "`,` or `}`"),
+            Some("list") => ("a list", "`,` or `]`"),
+            Some("string") => ("a text", "its closing quote"),
+            _ => ("the document", "a value"),
+        };
+        fault = format!("{within} does not end, expected {close}");
+        return ScenesError::Syntax { fault, found: "the end of the file".into(), at: end };
+    }
+    let line: usize = text.split_inclusive('\n').take(error.line().saturating_sub(1)).map(str::len).sum();
+    let mut at = (line + error.column().saturating_sub(1)).min(end);
+    while !text.is_char_boundary(at) {
+        at -= 1;
+    }
+    let rest = text[at..].lines().next().unwrap_or_default().trim();
+    ScenesError::Syntax { fault, found: format!("`{}`", shortened(rest)), at }
 }
 
 struct Reader {
@@ -67,7 +98,7 @@ struct Reader {
 }
 
 /// Place of a key below another.
-fn join(path: &str, key: &str) -> String {
+pub(super) fn join(path: &str, key: &str) -> String {
     if path.is_empty() { shortened(key) } else { format!("{path}.{}", shortened(key)) }
 }
 
@@ -85,7 +116,7 @@ impl Reader {
         self.faults.len() >= fault::MOST
     }
 
-    fn document(&mut self, file: &str, tree: &Json) -> Option<SceneSet> {
+    fn document(&mut self, file: &str, text: &str, tree: &Json) -> Option<SceneSet> {
         let top = self.object(tree, "", TOP)?;
         let schema = self.required(top, "", "schema", "\"schema\": \"trajc.scenes/1\"")?;
         if *schema != Json::Text(SCHEMA.into()) {
@@ -116,7 +147,7 @@ impl Reader {
             Some(Json::Flag(flag)) => Some(*flag),
             Some(other) => self.kind("reverse", "true or false", other),
         };
-        let limits = get(top, "limits").map_or(Some(LimitsSpec::default()), |value| self.limits(file, value));
+        let limits = get(top, "limits").map_or(Some(LimitsSpec::default()), |value| self.limits(file, text, value));
         let scenes = self.required(top, "", "scenes", "\"scenes\": [{\"id\": \"a\", …}]").and_then(|s| self.scenes(s));
         Some(SceneSet {
             file: file.into(),
@@ -160,7 +191,17 @@ impl Reader {
         key: &str,
         example: &'static str,
     ) -> Option<&'a Json> {
-        get(entries, key).or_else(|| self.fault(ScenesError::Missing { path: join(path, key), example }))
+        let found = get(entries, key);
+        // An unknown key that is near to it was told with that hint; once is enough.
+        let told = || {
+            let known = [TOP, SCENE, BOX, POSE].into_iter().find(|known| known.contains(&key)).unwrap_or(&[]);
+            let strange = entries.iter().map(|(key, _)| key.as_str()).filter(|key| !known.contains(key));
+            strange.into_iter().any(|strange| nearest(strange, known.iter().copied()) == Some(key))
+        };
+        if found.is_none() && !told() {
+            return self.fault(ScenesError::Missing { path: join(path, key), example });
+        }
+        found
     }
 
     fn number(&mut self, value: &Json, path: &str, least: f64, most: f64) -> Option<f64> {
@@ -209,11 +250,11 @@ impl Reader {
     }
 
     /// Checked by the table of a mission's limits, which knows keys, units and ranges.
-    fn limits(&mut self, file: &str, value: &Json) -> Option<LimitsSpec> {
+    fn limits(&mut self, file: &str, text: &str, value: &Json) -> Option<LimitsSpec> {
         if !matches!(value, Json::Map(_)) {
             return self.kind("limits", "an object", value);
         }
-        let source = Arc::new(Source { name: file.into(), text: format!("{{\"limits\": {value}}}") });
+        let source = Arc::new(Source { name: file.into(), text: only_limits(text) });
         let mut faults = match yaml::load(&source) {
             Err(diagnostics) => diagnostics.0,
             Ok(root) => {
@@ -222,13 +263,16 @@ impl Reader {
                     faults = limits::check(&source, root.get("limits"));
                 }
                 if faults.is_empty() {
-                    return Some(limits::read(root.get("limits")));
+                    return Some(limits::read(&source, root.get("limits")));
                 }
                 faults
             }
         };
-        // The spans are of our own rendering; the paths in the messages are what leads to the place.
-        faults.iter_mut().for_each(|d| (d.at, d.file) = (None, Some(file.into())));
+        // Same places, in the text as it is.
+        let written = Arc::new(Source { name: file.into(), text: text.into() });
+        for fault in &mut faults {
+            fault.at = fault.at.as_ref().map(|at| Span::new(&written, at.range.clone()));
+        }
         self.others.extend(faults);
         None
     }
@@ -333,6 +377,21 @@ impl Reader {
 }
 
 /// The first value with this key.
+/// The text with blanks for all but `{"limits": …}`, for the reader of YAML, which JSON is.
+fn only_limits(text: &str) -> String {
+    let Some(place) = places(text, "limits", join).into_iter().next() else { return String::new() };
+    let from = place.key.map_or(place.value.start, |key| key.start);
+    let (open, close) = (text.find('{').unwrap_or(0), text.rfind('}').unwrap_or(0));
+    let kept = |at: usize, byte: u8| match byte {
+        b'\n' => byte,
+        b'\t' | b'\r' => b' ',
+        _ if (from..place.value.end).contains(&at) || at == open || at == close => byte,
+        _ => b' ',
+    };
+    let bytes = text.bytes().enumerate().map(|(at, byte)| kept(at, byte)).collect();
+    String::from_utf8(bytes).unwrap_or_default()
+}
+
 fn get<'a>(entries: &'a [(String, Json)], key: &str) -> Option<&'a Json> {
     entries.iter().find(|(k, _)| k == key).map(|(_, value)| value)
 }

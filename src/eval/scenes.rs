@@ -85,16 +85,16 @@ impl SceneSet {
         VoxelMap::from_boxes(self.bounds, self.resolution, &scene.boxes, Unknown::Occupied)
     }
 
-    /// Joints that scenes name must be the robot's, at values it can hold.
+    /// Joints that scenes name must be the robot's, at values it can hold. `text`: what the set was read from, for messages.
     ///
     /// # Errors
     /// The first hundred faults.
-    pub fn fits(&self, robot: &RobotModel) -> Result<(), Diagnostics> {
+    pub fn fits(&self, robot: &RobotModel, text: &str) -> Result<(), Diagnostics> {
         let mut faults = Vec::new();
         for (i, scene) in self.scenes.iter().enumerate() {
             for (end, pose) in [("start", &scene.start), ("goal", &scene.goal)] {
                 for (name, value) in &pose.joints {
-                    let path = format!("scenes[{i}].{end}.joints.{name}");
+                    let path = super::read::join(&format!("scenes[{i}].{end}.joints"), name);
                     match robot.joints.iter().find(|j| j.name == *name) {
                         None => {
                             let known = robot.joints.iter().map(|j| j.name.clone()).collect();
@@ -113,7 +113,7 @@ impl SceneSet {
             }
         }
         faults.truncate(super::fault::MOST);
-        if faults.is_empty() { Ok(()) } else { Err(super::fault::diagnostics(&self.file, &faults)) }
+        if faults.is_empty() { Ok(()) } else { Err(super::fault::diagnostics(&self.file, text, &faults)) }
     }
 
     /// The first id that is there twice.

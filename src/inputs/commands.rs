@@ -5,11 +5,12 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use super::{Disk, folder_of, read_with, tidy};
+use super::{Disk, folder_of, missing, read_with, tidy};
 use crate::certify::{Certificate, Refusal, RefusalKind};
 use crate::command::CommandTable;
-use crate::diag::{Diagnostic, Diagnostics};
+use crate::diag::{Diagnostic, Diagnostics, Source, Span};
 use crate::emit::csv::{self, CsvHeader};
 use crate::emit::mcap::attached;
 use crate::emit::mcap_read::{self, Attached, Topic};
@@ -101,7 +102,7 @@ pub fn read(path: &Path) -> Result<CommandFile, Diagnostics> {
         None => None,
         Some(bytes) => Some(serde_json::from_slice(bytes).map_err(|error| {
             let message = format!("attachment `{}` is no report: {error}", attached::REPORT);
-            Diagnostics::from(Diagnostic::error("commands/report", message).file(&name))
+            Diagnostics::from(Diagnostic::error("commands/report", message).file(&name).hint("compile it again"))
         })?),
     };
     Ok(CommandFile {
@@ -167,7 +168,17 @@ impl CommandFile {
 
     fn mission_is_missing(&self, path: &Path) -> Diagnostic {
         let message = format!("`{}` names the mission `{}`, which is not there", self.path.display(), path.display());
-        Diagnostic::error("check/mission-missing", message).hint("say which one with --mission MISSION.yaml")
+        let near = missing(path).1.map_or(String::new(), |near| format!("{near} "));
+        let fault = Diagnostic::error("check/mission-missing", message)
+            .hint(format!("{near}say which one with --mission MISSION.yaml; paths are relative to the command file"));
+        let name = self.path.display().to_string();
+        match std::fs::read_to_string(&self.path).ok().and_then(|text| Some((text.find("# mission:")?, text))) {
+            Some((start, text)) => {
+                let end = text[start..].find('\n').map_or(text.len(), |i| start + i);
+                fault.at(&Span::new(&Arc::new(Source { name, text }), start..end))
+            }
+            None => fault.file(name),
+        }
     }
 
     fn attachment(&self, name: &str) -> Option<&[u8]> {

@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
+use std::sync::Arc;
 
 use super::tidy;
-use crate::diag::{Diagnostic, Diagnostics, Span};
+use crate::diag::{Diagnostic, Diagnostics, Source, Span, nearest};
 use crate::memory;
 use crate::pipeline::TextFile;
 use crate::robot::Files;
@@ -147,13 +148,23 @@ impl Disk {
             Err(error) => {
                 let at = error.utf8_error().valid_up_to();
                 let message = format!("`{name}` is not UTF-8 text: byte {at} begins no character");
-                Err(Diagnostic::error("input/not-text", message).file(name).hint("save the file as UTF-8").into())
+                // Up to there it is text, so the place is the same in what can be shown of it.
+                let text = String::from_utf8_lossy(error.as_bytes()).into_owned();
+                let end = at + text[at..].chars().next().map_or(0, char::len_utf8);
+                let span = Span::new(&Arc::new(Source { name, text }), at..end);
+                Err(Diagnostic::error("input/not-text", message).at(&span).hint("save the file as UTF-8").into())
             }
         }
     }
 }
 
 impl Files for Disk {
+    fn nearest(&self, path: &Path) -> Option<String> {
+        // Of a folder that is not there others beside it tell nothing: meshes are looked for in many places.
+        let (lost, near) = near(path);
+        near.filter(|_| self.is_real() && lost == path)
+    }
+
     fn may_leave(&self, path: &Path) -> bool {
         // What is attached is not on the disk.
         self.attached.is_some() || super::allowed(path)
@@ -193,21 +204,75 @@ pub fn regular(path: &Path) -> io::Result<()> {
 fn unreadable(path: &Path, error: &io::Error, named_by: Option<&Span>) -> Diagnostic {
     let name = path.display().to_string();
     let (what, hint) = match error.kind() {
-        io::ErrorKind::NotFound => (
-            format!("no such file: `{name}`"),
-            if named_by.is_some() { "paths are relative to the file that names them" } else { "check the path" },
-        ),
-        io::ErrorKind::IsADirectory => (format!("`{name}` is a folder, expected a file"), "name the file in it"),
-        io::ErrorKind::InvalidInput => {
-            (format!("`{name}` {error}: only files are read"), "write what comes out of it to a file first")
+        io::ErrorKind::NotFound => {
+            let (why, near) = missing(path);
+            // The file that names it was not meant.
+            let own = named_by.and_then(|span| Path::new(&span.source.name).file_name()?.to_str());
+            let near = near.filter(|near| own.is_none_or(|own| !near.contains(&format!("`{own}`"))));
+            let relative = if named_by.is_some() {
+                "paths are relative to the file that names them"
+            } else {
+                "paths are relative to the folder where the program runs"
+            };
+            let hint = near.map_or(relative.to_owned(), |near| format!("{near} {relative}"));
+            (format!("no such file: `{name}`{why}"), hint)
         }
-        io::ErrorKind::FileTooLarge => (format!("`{name}` would take {error}"), memory::HINT),
-        _ if path.is_symlink() => (format!("cannot read `{name}`: {error}"), "check where the link leads"),
-        _ => (format!("cannot read `{name}`: {error}"), "check its permissions"),
+        io::ErrorKind::IsADirectory => {
+            let inside = names(path, |kind| kind.is_file());
+            let shown: Vec<String> = inside.iter().take(4).map(|name| format!("`{name}`")).collect();
+            let such = if shown.is_empty() { String::new() } else { format!(", such as {}", shown.join(", ")) };
+            (format!("`{name}` is a folder, expected a file"), format!("name the file in it{such}"))
+        }
+        io::ErrorKind::InvalidInput => {
+            (format!("`{name}` {error}: only files are read"), "write what comes out of it to a file first".into())
+        }
+        io::ErrorKind::FileTooLarge => (format!("`{name}` would take {error}"), memory::HINT.into()),
+        // A path below a file.
+        io::ErrorKind::NotADirectory => {
+            let file = path.ancestors().find(|above| above.is_file()).unwrap_or(path).display().to_string();
+            (format!("no such file: `{name}`: `{file}` is a file, no folder"), "check the path".into())
+        }
+        _ if path.is_symlink() => (format!("cannot read `{name}`: {error}"), "check where the link leads".into()),
+        _ => (format!("cannot read `{name}`: {error}"), "check its permissions".into()),
     };
     let diagnostic = Diagnostic::error("input/unreadable", what).hint(hint);
     match named_by {
         Some(span) => diagnostic.at(span),
         None => diagnostic.file(name),
     }
+}
+
+/// What a folder holds of a kind, sorted; hidden files are nobody's input.
+fn names(folder: &Path, kind: impl Fn(&std::fs::FileType) -> bool) -> Vec<String> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    let mut names: Vec<String> = entries
+        .filter_map(|entry| {
+            let entry = entry.ok().filter(|entry| entry.file_type().is_ok_and(|found| kind(&found)))?;
+            entry.file_name().into_string().ok().filter(|name| !name.starts_with('.'))
+        })
+        .collect();
+    names.sort();
+    names
+}
+
+/// The first folder on the way to a file that is not there, else the file; and the name beside it that may have been meant.
+fn near(path: &Path) -> (&Path, Option<String>) {
+    let mut lost = path;
+    while let Some(parent) = lost.parent().filter(|parent| !parent.as_os_str().is_empty() && !parent.is_dir()) {
+        lost = parent;
+    }
+    let wrong = lost.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let of_kind = |folders: bool| {
+        let known = names(&super::folder_of(lost), |kind| kind.is_symlink() || kind.is_dir() == folders);
+        nearest(&wrong, known.iter().map(String::as_str)).map(str::to_owned)
+    };
+    // Some names may be a folder's or a file's.
+    (lost, of_kind(lost != path).or_else(|| of_kind(true)))
+}
+
+/// Why a file may not be there (its folder is not), and what was meant, as far as can be told; for messages.
+pub fn missing(path: &Path) -> (String, Option<String>) {
+    let (lost, near) = near(path);
+    let why = if lost == path { String::new() } else { format!(": there is no folder `{}`", lost.display()) };
+    (why, near.map(|near| format!("did you mean `{near}`?")))
 }

@@ -15,7 +15,7 @@ use crate::map;
 use crate::mission::{self, Mission, PathSpec};
 use crate::pipeline::{Inputs, MapFile, TextFile};
 use crate::robot::spec;
-pub use disk::{Disk, Named, ReadFile, regular};
+pub use disk::{Disk, Named, ReadFile, missing, regular};
 
 /// Everything a mission names, read from disk.
 ///
@@ -113,13 +113,10 @@ pub fn read_map_file(path: &Path, disk: &Disk, named_by: Option<&crate::diag::Sp
     let name = path.display().to_string();
     let beside = match map::beside(&name, &bytes)? {
         None => None,
-        Some((other, required)) => {
+        Some((other, named_by)) => {
             let other = tidy(&other);
-            if required || other.is_file() {
-                let bytes = disk.binary(&other, None).map_err(|Diagnostics(faults)| {
-                    let named_by = format!("`{name}` names it; paths are relative to that file");
-                    Diagnostics(faults.into_iter().map(|fault| fault.hint(&named_by)).collect())
-                })?;
+            if named_by.is_some() || other.is_file() {
+                let bytes = disk.binary(&other, named_by.as_ref())?;
                 Some((other.display().to_string(), bytes))
             } else {
                 disk.miss(&other);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Disk, folder_of, tidy};
+use super::{Disk, folder_of, missing, tidy};
 use crate::command::CommandTable;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::emit::csv::{self, CsvHeader};
@@ -24,9 +24,10 @@ pub(super) fn read(path: &Path, robot: &Path, mission: &Mission, disk: &Disk) ->
         return Err(Diagnostic::error("mission/start-file", message).maybe_at(named_by).hint(hint).into());
     }
     let bytes = disk.file(path, named_by).map_err(|Diagnostics(faults)| {
-        let hint =
+        let compile =
             "compile the mission first whose commands these are; `trajc build` does so by itself where it builds both";
-        Diagnostics(faults.into_iter().map(|fault| fault.hint(hint)).collect())
+        let hint = missing(path).1.map_or(compile.to_owned(), |near| format!("{near} else {compile}"));
+        Diagnostics(faults.into_iter().map(|fault| fault.hint(hint.clone())).collect())
     })?;
     let (table, header): (CommandTable, CsvHeader) = if ending("mcap") {
         let file = mcap_read::read(&name, &bytes)?;

@@ -1,6 +1,6 @@
 //! Why a map cannot be read.
 
-use crate::diag::{Describe, Diagnostic, Span};
+use crate::diag::{Describe, Diagnostic, Span, suggestion};
 use crate::memory::{self, TooMuch};
 
 /// Endings that are read, for messages.
@@ -14,13 +14,13 @@ pub(super) enum MapError {
     #[error("cannot read maps {}", if ending.is_empty() { "without an ending".into() } else { format!("of format `{ending}`") })]
     Format { ending: String },
     /// An image was named where its YAML belongs.
-    #[error("an image alone has no scale: name the map_server .yaml that belongs to it")]
-    ImageAlone,
+    #[error("an image alone has no scale: expected the map_server .yaml that belongs to it")]
+    ImageAlone { sheet: String },
     /// The first bytes are not the format's.
-    #[error("not a {format} file: it does not begin with {begin}")]
+    #[error("this is no {format} file: it does not begin with {begin}")]
     NotThisFormat { format: &'static str, begin: &'static str },
     /// The header does not end.
-    #[error("the {format} header has no `{last}` line")]
+    #[error("the {format} header has no `{last}` line, which ends it")]
     NoHeaderEnd { format: &'static str, last: &'static str },
     /// A word of the header that is not known.
     #[error("unknown line `{word}` in the {format} header")]
@@ -43,6 +43,9 @@ pub(super) enum MapError {
     /// A coordinate is not in the file.
     #[error("no column `{missing}`: the file has {found}")]
     NoCoordinate { missing: char, found: String, at: Option<Span> },
+    /// The same of a table, whose header is this line.
+    #[error("no column `{missing}`: the header has {found}")]
+    NoColumn { missing: char, found: String, line: u64 },
     /// Fewer bytes than the header promises.
     #[error("truncated: {promised} {unit} promised ({promised_bytes} bytes), but only {have_bytes} bytes are there")]
     Truncated { unit: &'static str, promised: u128, promised_bytes: u128, have_bytes: u128 },
@@ -55,13 +58,13 @@ pub(super) enum MapError {
     #[error("{} {unit} promised, but {have} are there", promised)]
     RowsDiffer { unit: &'static str, promised: u64, have: u64 },
     /// A row with the wrong number of columns.
-    #[error("line {line} has {got} column{}, expected {expected}: `{text}`", if *.got == 1 { "" } else { "s" })]
+    #[error("`{text}` has {got} column{}, expected {expected}", if *.got == 1 { "" } else { "s" })]
     Columns { line: u64, got: usize, expected: String, text: String },
     /// A word that is not a number.
-    #[error("line {line}: `{word}` is not a number")]
+    #[error("{} is not a number", if word.is_empty() { "an empty cell".into() } else { format!("`{word}`") })]
     NotANumber { line: u64, word: String },
     /// A row that may have decimal commas.
-    #[error("line {line} has both commas and semicolons: `{text}`")]
+    #[error("`{text}` has both commas and semicolons")]
     MixedSeparators { line: u64, text: String },
     /// An octree that ends within a node.
     #[error(
@@ -129,11 +132,11 @@ pub(super) enum MapError {
     #[error("a box from {:?} to {:?} is upside down, too thin for a grid, or farther than {limit} m", &corners[..3], &corners[3..])]
     Box { corners: Vec<f64>, limit: f64 },
     /// The slab is upside down or not finite.
-    #[error("height_m [{low}, {high}] is not a slab")]
+    #[error("`height_m` [{low}, {high}] is no slab: expected [floor, ceiling], the lower first")]
     Slab { low: f64, high: f64 },
     /// NPY header that is not understood.
     #[error("the .npy header is not understood: {fault}")]
-    NpyHeader { fault: &'static str },
+    NpyHeader { fault: String },
     /// A type that has no meaning here.
     #[error("the array is of type `{descr}`: expected {expected}")]
     NpyType { descr: String, expected: &'static str },
@@ -171,6 +174,41 @@ fn short(value: f64) -> String {
 }
 
 impl MapError {
+    /// What a fault in a row of text quotes, and the row's line, from 1.
+    pub(super) fn row(&self) -> Option<(u64, &str)> {
+        match self {
+            Self::Columns { line, text, .. } | Self::MixedSeparators { line, text } => Some((*line, text)),
+            Self::NotANumber { line, word } => Some((*line, word)),
+            Self::NoColumn { line, .. } => Some((*line, "")),
+            _ => None,
+        }
+    }
+}
+
+/// A good line of a header, or a good value of a map_server .yaml.
+fn example(word: &str) -> &'static str {
+    match word.split(' ').next().unwrap_or_default() {
+        "VERSION" => "`VERSION 0.7`",
+        "FIELDS" => "`FIELDS x y z`",
+        "SIZE" | "TYPE" => "`SIZE 4 4 4` with `TYPE F F F`",
+        "COUNT" => "`COUNT 1 1 1`: 1 for x, y and z each",
+        "WIDTH" => "`WIDTH 1000` with `HEIGHT 1`",
+        "HEIGHT" => "`HEIGHT 1`",
+        "POINTS" => "`POINTS 1000`",
+        "DATA" => "`DATA ascii`",
+        "format" => "`format ascii 1.0` or `format binary_little_endian 1.0`",
+        "element" => "`element vertex 1000`",
+        "property" => "`property float x`",
+        "res" => "`res 0.05`, in metres",
+        "size" => "`size 1000`, the number of nodes",
+        "id" => "`id OcTree`",
+        "occupied_thresh" => "`occupied_thresh: 0.65`",
+        "free_thresh" => "`free_thresh: 0.25`",
+        _ => "what the tool writes that made the others",
+    }
+}
+
+impl MapError {
     /// Whether it can only be about an occupancy map's image, where there is one.
     pub(super) fn is_of_pixels(&self) -> bool {
         use MapError::*;
@@ -190,14 +228,33 @@ impl Describe for MapError {
             LazNotBuilt => {
                 d.hint("build with `cargo install --path . --features laz`, or unpack it: `pdal translate map.laz map.las`")
             }
-            UnknownHeaderLine { nearest, at, .. } => match nearest {
-                Some(near) => d.at(at).hint(format!("did you mean `{near}`?")),
-                None => d.at(at),
-            },
-            HeaderTwice { at, .. } | HeaderValue { at, .. } | HeaderLength { at, .. } | PointsDiffer { at, .. } => d.at(at),
-            NoCoordinate { at, .. } => {
-                d.maybe_at(at.as_ref()).hint("coordinates are called x, y, z (in tables also x_m, y_m, z_m)")
+            UnknownHeaderLine { format, nearest, at, .. } => d.at(at).hint(match nearest {
+                Some(near) => format!("did you mean `{near}`?"),
+                None if *format == "PCD" => "lines of a PCD header are VERSION, FIELDS, SIZE, TYPE, COUNT, WIDTH, HEIGHT, VIEWPOINT, POINTS, DATA".into(),
+                None => "lines of a PLY header are format, comment, obj_info, element, property, end_header".into(),
+            }),
+            HeaderTwice { at, .. } => d.at(at).hint("keep one of the two lines, the one that is right"),
+            HeaderValue { word, at, .. } => d.at(at).hint(format!("for example {}", example(word))),
+            HeaderLength { fields, at, .. } => d.at(at).hint(format!("write {fields}, one for each field of FIELDS")),
+            PointsDiffer { width, height, at, .. } => {
+                d.at(at).hint(format!("write POINTS {}, or correct WIDTH and HEIGHT", u128::from(*width) * u128::from(*height)))
             }
+            NoHeaderEnd { format: "PCD", .. } => {
+                d.hint("the header's last line is DATA ascii, binary or binary_compressed: was the file cut off?")
+            }
+            NoHeaderEnd { .. } => d.hint("was the file cut off?"),
+            HeaderMissing { word, .. } => d.hint(format!("add the line, for example {}; or export the cloud again", example(word))),
+            NotThisFormat { format, .. } => d.hint(match *format {
+                "NPY" => "it is written by numpy.save(\"map.npy\", array); is the file's ending right?",
+                _ => "is the file's ending right? the format is told by it",
+            }),
+            ImageAlone { sheet } => d.hint(format!("name the .yaml beside it: `{sheet}`")),
+            Columns { .. } => d.hint("a point is x, y and z in metres: three numbers a line at least, with one kind of separator"),
+            NotANumber { .. } => d.hint("write a number in metres, decimals with a point; comments begin with `#`"),
+            NoCoordinate { missing, at, .. } => d.maybe_at(at.as_ref()).hint(format!(
+                "coordinates are called x, y, z: `FIELDS x y z` in a PCD, `property float {missing}` of the vertices in a PLY"
+            )),
+            NoColumn { .. } => d.hint("columns of coordinates are called x, y, z or x_m, y_m, z_m; without a header they are the first three"),
             Truncated { promised, have_bytes, promised_bytes, .. } => d
                 .hint("the file was cut off while it was written or copied, or its header lies; make it again")
                 .number("promised", *promised as f64)
@@ -206,7 +263,9 @@ impl Describe for MapError {
             Surplus { .. } | RowsDiffer { .. } => d.hint("the header lies, or the file was cut off; make it again"),
             MixedSeparators { .. } => d.hint("write decimals with a point, columns with one kind of separator"),
             NoPoints { points, not_finite } => {
-                d.number("points", *points as u64).number("not_finite", *not_finite as u64)
+                d.hint("export it again: a map needs one finite point at least")
+                    .number("points", *points as u64)
+                    .number("not_finite", *not_finite as u64)
             }
             FarAway { .. } => d.hint("metres are expected; of a georeferenced cloud subtract the offset first"),
             TooLarge { enough: Some(enough), .. } => {
@@ -224,13 +283,33 @@ impl Describe for MapError {
                 "write `resolution_m` (and `origin_m`) in the mission's `map:`, or {\"resolution\": 0.05, \"origin\": [x, y, z]} \
                  in a .json of the same name beside it",
             ),
-            Origin { at, .. } | Description { at, .. } => d.maybe_at(at.as_ref()),
+            Origin { at, .. } => d.maybe_at(at.as_ref()).hint("metres: [x, y, yaw] in a map_server .yaml, [x, y, z] of voxels"),
+            Description { what, at, .. } => d.maybe_at(at.as_ref()).hint(match *what {
+                "YAML" => "a map_server .yaml has `image: map.pgm`, `resolution: 0.05` and `origin: [0, 0, 0]`, one a line",
+                _ => "it is JSON such as {\"resolution\": 0.05, \"origin\": [0, 0, 0]}",
+            }),
+            OriginUnused => d.hint("remove `origin_m`"),
+            Slab { .. } => d.hint("such as `height_m: [0.02, 1.0]`, in metres"),
+            Box { .. } => d.hint("write the lower corner first, in metres"),
+            NpyHeader { .. } => d.hint("write the array with numpy.save"),
+            NpyType { descr, .. } if !descr.contains(['f', 'i', 'u', 'b']) => {
+                d.hint("convert it first: numpy.save(file, points.astype(\"f4\"))")
+            }
+            TooDeep { .. } | NoOccupancy { .. } | Damaged { .. } | UnpackedSize { .. } => {
+                d.hint("the file is damaged: copy or export it again")
+            }
+            #[cfg(feature = "laz")]
+            LazDamaged { .. } => d.hint("the file is damaged: copy or export it again"),
+            LasHeader { .. } => d.hint("the file is damaged or of a newer kind; `pdal translate in.las out.las` writes it anew"),
+            PgmHeader { .. } => d.hint("a PGM begins with P5 or P2, then width, height, maximum: such as `P5 640 480 255`"),
+            Pixel { max, .. } => d.hint(format!("write a larger maximum than {max} in the header, or correct the pixel")),
             NpyType { expected: "booleans or integers", .. } => d.hint("threshold it first: numpy.save(file, grid > 0.5)"),
+            NpyType { .. } => d.hint("convert it first: numpy.save(file, points.astype(\"f4\"))"),
             NpyShape { shape } if shape.first() == Some(&3) => d.hint("it looks transposed: save points.T"),
-            Mode { at, .. } => d.at(at).hint("map_server's own default is trinary"),
+            NpyShape { .. } => d.hint("reshape it: points.reshape(-1, 3), or a grid with three axes"),
+            Mode { mode, at } => d.at(at).hint(suggestion(mode, ["trinary", "scale", "raw"], "modes are", "")),
             NoImage { at, .. } => d.at(at).hint("the path is relative to the .yaml"),
             NotPgm { .. } => d.hint("convert it, e.g. `magick map.png map.pgm`, and name that in the .yaml"),
-            _ => d,
         }
     }
 }
@@ -239,7 +318,7 @@ impl MapError {
     fn code(&self) -> &'static str {
         use MapError::*;
         match self {
-            Format { .. } | LazNotBuilt | ImageAlone | NotThisFormat { .. } | NotPgm { .. } => "map/format",
+            Format { .. } | LazNotBuilt | ImageAlone { .. } | NotThisFormat { .. } | NotPgm { .. } => "map/format",
             NoHeaderEnd { .. }
             | UnknownHeaderLine { .. }
             | HeaderTwice { .. }
@@ -251,7 +330,7 @@ impl MapError {
             | PgmHeader { .. }
             | LasHeader { .. }
             | UnpackedSize { .. } => "map/header",
-            NoCoordinate { .. } => "map/no-coordinate",
+            NoCoordinate { .. } | NoColumn { .. } => "map/no-coordinate",
             Truncated { .. } => "map/truncated",
             Surplus { .. } => "map/surplus",
             RowsDiffer { promised, have, .. } if have < promised => "map/truncated",

@@ -22,8 +22,9 @@ mod turned;
 mod voxelize;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use crate::diag::{Describe, Diagnostics};
+use crate::diag::{Describe, Diagnostics, Source, Span};
 use crate::geom::Aabb;
 use crate::mission::{MapSpec, Unknown};
 
@@ -173,16 +174,18 @@ fn ending(name: &str) -> String {
 }
 
 /// The file that must (map_server image) or may (`.json` of voxels in `.npy`) lie beside a map file, as a path joined to the
-/// map's folder, and whether it must.
+/// map's folder; of one that must, where the map's file names it.
 ///
 /// # Errors
 /// Unreadable map_server YAML.
-pub fn beside(name: &str, bytes: &[u8]) -> Result<Option<(PathBuf, bool)>, Diagnostics> {
+pub fn beside(name: &str, bytes: &[u8]) -> Result<Option<(PathBuf, Option<Span>)>, Diagnostics> {
     match ending(name).as_str() {
         ".yaml" | ".yml" => {
-            Ok(Some((occupancy::image(name, bytes).map_err(|faults| in_file(name, None, faults))?, true)))
+            let (image, named) = occupancy::image(name, bytes)
+                .map_err(|faults| in_file(&MapInputs { name, bytes, beside: None }, faults))?;
+            Ok(Some((image, Some(named))))
         }
-        ".npy" if npy::axes(bytes) == Some(3) => Ok(Some((Path::new(name).with_extension("json"), false))),
+        ".npy" if npy::axes(bytes) == Some(3) => Ok(Some((Path::new(name).with_extension("json"), None))),
         _ => Ok(None),
     }
 }
@@ -196,16 +199,36 @@ pub fn beside(name: &str, bytes: &[u8]) -> Result<Option<(PathBuf, bool)>, Diagn
 /// All faults found: unknown format, lies in headers, truncated data, resolution that differs from the grid's own, no points.
 /// All are bad input (exit 2); what is wrong in a header or in YAML has its place there, all others name the file.
 pub fn parse(inputs: &MapInputs<'_>, spec: &MapSpec, robot_height: f64) -> Result<VoxelMap, Diagnostics> {
-    read(inputs, spec, robot_height).map_err(|faults| in_file(inputs.name, inputs.beside.map(|(name, _)| name), faults))
+    read(inputs, spec, robot_height).map_err(|faults| in_file(inputs, faults))
+}
+
+/// The place of a word in a row of text, else of the row. Of a map of a million rows only that row is kept.
+fn row(inputs: &MapInputs<'_>, line: u64, quoted: &str) -> Span {
+    let before = usize::try_from(line).unwrap_or(usize::MAX).saturating_sub(1);
+    let bytes = inputs.bytes.split(|b| *b == b'\n').nth(before).unwrap_or_default();
+    let bytes = if before == 0 { bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes) } else { bytes };
+    let row = String::from_utf8_lossy(bytes).trim_end().to_owned();
+    let separates = |c: Option<char>| c.is_none_or(|c| c.is_whitespace() || matches!(c, ',' | ';' | '"'));
+    let alone =
+        |at: usize| separates(row[..at].chars().next_back()) && separates(row[at + quoted.len()..].chars().next());
+    let word = row.match_indices(quoted).map(|(at, _)| at).find(|at| !quoted.is_empty() && alone(*at));
+    let start = word.unwrap_or_else(|| row.len() - row.trim_start().len());
+    let end = word.map_or(row.len(), |at| at + quoted.len());
+    let source = Arc::new(Source { name: inputs.name.to_owned(), text: "\n".repeat(before) + &row });
+    Span::new(&source, before + start..before + end)
 }
 
 /// Diagnostics of a file's faults: where no text can be quoted, the file is named, or the image that the file names.
-fn in_file(name: &str, beside: Option<&str>, faults: Vec<MapError>) -> Diagnostics {
-    let image = beside.filter(|_| [".yaml", ".yml"].contains(&ending(name).as_str()));
+fn in_file(inputs: &MapInputs<'_>, faults: Vec<MapError>) -> Diagnostics {
+    let beside = inputs.beside.map(|(name, _)| name);
+    let image = beside.filter(|_| [".yaml", ".yml"].contains(&ending(inputs.name).as_str()));
     let named = |fault: &MapError| {
         let diagnostic = fault.diagnostic();
+        if let Some((line, quoted)) = fault.row() {
+            return diagnostic.at(&row(inputs, line, quoted));
+        }
         let about = if fault.is_of_pixels() { image } else { None };
-        if diagnostic.at.is_some() { diagnostic } else { diagnostic.file(about.unwrap_or(name)) }
+        if diagnostic.at.is_some() { diagnostic } else { diagnostic.file(about.unwrap_or(inputs.name)) }
     };
     Diagnostics(faults.iter().map(named).collect())
 }
@@ -256,7 +279,10 @@ fn of_file(inputs: &MapInputs<'_>, spec: &MapSpec, slab: Slab) -> Result<VoxelMa
             }
             return tree.voxels(spec.resolution, slab, spec.unknown).map_err(|fault| vec![fault]);
         }
-        ".pgm" | ".png" => return Err(vec![MapError::ImageAlone]),
+        ".pgm" | ".png" => {
+            let sheet = Path::new(name).with_extension("yaml").display().to_string();
+            return Err(vec![MapError::ImageAlone { sheet }]);
+        }
         other => return Err(vec![MapError::Format { ending: other.to_owned() }]),
     };
     let faults = origin_unused(spec);
@@ -284,12 +310,26 @@ struct Beside {
 }
 
 /// Cell size and lower corner of a `.npy` grid: the mission's origin wins; its resolution must agree.
+/// What the JSON parser says of the file beside a map, and where.
+fn description(name: &str, bytes: &[u8], error: &serde_json::Error) -> MapError {
+    let words = error.to_string();
+    let fault = words.split(" at line ").next().unwrap_or_default().to_owned();
+    let source = Arc::new(Source { name: name.to_owned(), text: String::from_utf8_lossy(bytes).into_owned() });
+    let text = source.text.as_str();
+    let line: usize = text.split_inclusive('\n').take(error.line().saturating_sub(1)).map(str::len).sum();
+    let mut at = (line + error.column().saturating_sub(1)).min(text.len());
+    while !text.is_char_boundary(at) {
+        at -= 1;
+    }
+    let found = text[at..].chars().next().map_or("the end of the file".into(), |c| format!("`{c}`"));
+    let place = Span::new(&source, at..at + text[at..].chars().next().map_or(0, char::len_utf8));
+    MapError::Description { what: ".json beside it", fault: format!("{fault}, found {found}"), at: Some(place) }
+}
+
 fn grid(beside: Option<(&str, &[u8])>, spec: &MapSpec) -> Result<(f64, [f64; 3]), Vec<MapError>> {
     let written = match beside {
         None => Beside::default(),
-        Some((_, bytes)) => serde_json::from_slice(bytes).map_err(|error| {
-            vec![MapError::Description { what: ".json beside it", fault: error.to_string(), at: None }]
-        })?,
+        Some((name, bytes)) => serde_json::from_slice(bytes).map_err(|error| vec![description(name, bytes, &error)])?,
     };
     if let Some(value) = written.resolution.filter(|r| !voxelize::usable(*r)) {
         return Err(vec![MapError::Resolution { value, at: None }]);

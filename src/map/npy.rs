@@ -111,7 +111,7 @@ struct Header {
 
 /// The header and the data after it.
 fn header(bytes: &[u8]) -> Result<(Header, &[u8]), MapError> {
-    let fault = |fault| MapError::NpyHeader { fault };
+    let fault = |fault: &str| MapError::NpyHeader { fault: fault.to_owned() };
     let rest =
         bytes.strip_prefix(b"\x93NUMPY").ok_or(MapError::NotThisFormat { format: "NPY", begin: "`\\x93NUMPY`" })?;
     let (length, rest) = match *rest {
@@ -128,7 +128,8 @@ fn header(bytes: &[u8]) -> Result<(Header, &[u8]), MapError> {
         have_bytes: have,
     })?;
     let text = std::str::from_utf8(text).map_err(|_| fault("it is not text"))?;
-    Ok((dictionary(text).map_err(fault)?, &rest[length..]))
+    let header = dictionary(text).map_err(|why| fault(&format!("{why}: `{}`", quote(text.as_bytes()))))?;
+    Ok((header, &rest[length..]))
 }
 
 /// The three entries of the header's Python dictionary. Its grammar is fixed by the format: no nesting to follow.

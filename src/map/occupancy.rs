@@ -7,6 +7,7 @@ use serde::Deserialize;
 use serde_saphyr::Spanned;
 
 use super::error::{MapError, room};
+use super::points::quote;
 use super::{FARTHEST, pgm, turned, voxelize};
 use super::{VoxelMap, voxelize::Slab};
 use crate::diag::{Source, Span};
@@ -60,10 +61,10 @@ pub(super) struct Sheet {
     free: f64,
 }
 
-/// The image's path, joined to the sheet's folder.
-pub(super) fn image(name: &str, bytes: &[u8]) -> Result<PathBuf, Vec<MapError>> {
+/// The image's path, joined to the sheet's folder, and where the sheet names it.
+pub(super) fn image(name: &str, bytes: &[u8]) -> Result<(PathBuf, Span), Vec<MapError>> {
     let sheet = sheet(name, bytes)?;
-    Ok(std::path::Path::new(name).parent().unwrap_or(std::path::Path::new("")).join(sheet.image))
+    Ok((std::path::Path::new(name).parent().unwrap_or(std::path::Path::new("")).join(sheet.image), sheet.image_at))
 }
 
 /// Reads the YAML.
@@ -73,9 +74,18 @@ pub(super) fn sheet(name: &str, bytes: &[u8]) -> Result<Sheet, Vec<MapError>> {
         std::str::from_utf8(bytes).map_err(|e| description(format!("no text after byte {}", e.valid_up_to()), None))?;
     let source = Arc::new(Source { name: name.to_owned(), text: text.to_owned() });
     let written: Written = serde_saphyr::from_str(text).map_err(|error| {
-        let at = error.location().map(|l| span(&source, l));
+        let mut at = error.location().map(|l| span(&source, l));
         // The first line says what is wrong; the rest would quote the text once more.
-        let fault = error.without_snippet().to_string().lines().next().unwrap_or("not YAML").to_owned();
+        let words = error.without_snippet().to_string();
+        let words = words.lines().next().unwrap_or("not YAML");
+        let mut fault =
+            words.split(" at line ").next().unwrap_or(words).replace("invalid floating point", "expected a number");
+        if fault.starts_with("missing field") {
+            // No line of the sheet is to blame.
+            at = Some(Span::new(&source, 0..text.lines().next().map_or(0, str::len)));
+        } else if let Some(at) = &at {
+            fault += &format!(", found `{}`", quote(text[at.range.clone()].as_bytes()));
+        }
         description(fault, at)
     })?;
     let mut faults = Vec::new();

@@ -158,7 +158,7 @@ fn fields<'a>(
             ("U", "8") => Scalar::U64,
             (kind, size) => {
                 faults.push(MapError::HeaderValue {
-                    word: format!("SIZE and TYPE of `{name}`"),
+                    word: format!("SIZE and TYPE of {name}"),
                     value: quote(format!("{size} {kind}").as_bytes()),
                     expected: "SIZE 1, 2, 4 or 8 with TYPE I or U, 4 or 8 with TYPE F",
                     at: size_at.clone(),
@@ -169,7 +169,7 @@ fn fields<'a>(
         let count = counts.map_or(Some(1), |(values, _)| values[k].parse().ok().filter(|c: &usize| *c > 0));
         let Some(count) = count else {
             faults.push(MapError::HeaderValue {
-                word: format!("COUNT of `{name}`"),
+                word: format!("COUNT of {name}"),
                 value: quote(counts.map_or("", |(values, _)| values[k]).as_bytes()),
                 expected: "a whole number above 0",
                 at: counts.map_or(at, |(_, at)| at).clone(),

@@ -56,7 +56,7 @@ impl Floor {
 /// # Errors
 /// As [`super::parse`].
 pub fn survey(inputs: &MapInputs<'_>) -> Result<Option<Survey>, Diagnostics> {
-    let faults = |faults: Vec<MapError>| in_file(inputs.name, None, faults);
+    let faults = |faults: Vec<MapError>| in_file(inputs, faults);
     let one = |fault: MapError| faults(vec![fault]);
     let (name, bytes) = (inputs.name, inputs.bytes);
     let points = match ending(name).as_str() {

@@ -17,7 +17,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Points<'static>, MapError> {
         }
         let separator = separator(line, row)?;
         if std::mem::take(&mut first) && cells(row, separator).any(is_name) {
-            columns = header(row, separator)?;
+            columns = header(line, row, separator)?;
             needed = columns.iter().max().map_or(3, |last| last + 1);
             continue;
         }
@@ -68,14 +68,14 @@ fn is_name(cell: &[u8]) -> bool {
     cell.iter().any(u8::is_ascii_alphabetic) && number(cell).is_none()
 }
 
-fn header(row: &[u8], separator: Separator) -> Result<[usize; 3], MapError> {
+fn header(line: u64, row: &[u8], separator: Separator) -> Result<[usize; 3], MapError> {
     let names: Vec<String> = cells(row, separator).map(|c| quote(c).to_ascii_lowercase()).collect();
     let mut columns = [0; 3];
     for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
         let at = names.iter().position(|n| n.strip_suffix("_m").unwrap_or(n) == axis);
         let missing = b"xyz"[k] as char;
         columns[k] =
-            at.ok_or_else(|| MapError::NoCoordinate { missing, found: quote(names.join(", ").as_bytes()), at: None })?;
+            at.ok_or_else(|| MapError::NoColumn { missing, found: quote(names.join(", ").as_bytes()), line })?;
     }
     Ok(columns)
 }

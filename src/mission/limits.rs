@@ -113,7 +113,7 @@ static BASE: [Field; 6] = [
 ];
 
 /// `limits:`, as far as it is well formed.
-pub(crate) fn read(limits: Option<&Node>) -> LimitsSpec {
+pub(crate) fn read(source: &Arc<Source>, limits: Option<&Node>) -> LimitsSpec {
     let Some(limits) = limits else { return LimitsSpec::default() };
     let table = |node: &Node| ActuatorLimitsSpec {
         lower: node.get("lower").and_then(Node::angle),
@@ -135,6 +135,7 @@ pub(crate) fn read(limits: Option<&Node>) -> LimitsSpec {
             .get("joints")
             .map(|joints| joints.entries().iter().map(|e| (e.key.clone(), table(&e.value))).collect())
             .unwrap_or_default(),
+        places: joint_names(source, Some(limits)),
         base: BaseLimitsSpec {
             speed: number("base", "speed_mps"),
             acceleration: number("base", "acceleration_mps2"),

@@ -75,6 +75,8 @@ pub struct MissionSpans {
     pub map_resolution: Option<Span>,
     /// The value of `map.height_m`.
     pub map_height: Option<Span>,
+    /// The value of `map.origin_m`.
+    pub map_origin: Option<Span>,
     /// `start` with its value.
     pub start: Option<Span>,
     /// The value of `start.file`.
@@ -263,6 +265,8 @@ pub struct LimitsSpec {
     pub joints: BTreeMap<String, ActuatorLimitsSpec>,
     /// Of the base.
     pub base: BaseLimitsSpec,
+    /// Where the joints are named, in their order.
+    pub places: Vec<(String, Span)>,
 }
 
 /// Limits of one actuator. `lower`, `upper` only for joints.

@@ -45,6 +45,9 @@ static BOX_FIELDS: [Field; 2] = [
     Field::required("max_m", CORNER, "[3, 2, 0.5]", "the opposite corner, metres"),
 ];
 
+/// What to do about a polygon that crosses itself.
+pub(super) const CROSSED: &str = "name the corners in their order around the area; two areas are two polygons";
+
 fn items<'a>(map: &'a Node, key: &str) -> &'a [Node] {
     map.get(key).map_or(&[], Node::items)
 }
@@ -88,6 +91,10 @@ pub(super) fn check(source: &Arc<Source>, map: &Node) -> Vec<Diagnostic> {
                 "name the corners of an area in their order, such as `[[2, 1], [3, 1], [3, 2]]`",
             );
         }
+        if let Some([one, other]) = polygon(node).filter(|p| has_an_area(p)).and_then(|p| crossing(&p)) {
+            let message = format!("`map.keep_out[{i}].polygon_m` crosses itself: its sides {one} and {other} cross");
+            fault("mission/keep-out", message, node.get("polygon_m").unwrap_or(node), CROSSED);
+        }
         if let Some([low, high]) = node.get("height_m").and_then(super::read::numbers)
             && high - low < THINNEST
         {
@@ -112,6 +119,22 @@ pub(super) fn check(source: &Arc<Source>, map: &Node) -> Vec<Diagnostic> {
     faults
 }
 
+/// The first two sides of a polygon, from 1, that cross each other. Sides that only touch are let pass, such as those of a list
+/// that repeats its first corner at its end.
+pub(super) fn crossing(polygon: &[[f64; 2]]) -> Option<[usize; 2]> {
+    let n = polygon.len();
+    let side = |i: usize| [polygon[i], polygon[(i + 1) % n]];
+    // Above 0 where a point lies left of a -> b.
+    let left = |[a, b]: [[f64; 2]; 2], p: [f64; 2]| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
+    let parts = |one, [p, q]: [[f64; 2]; 2]| {
+        let (p, q) = (left(one, p), left(one, q));
+        p < 0.0 && q > 0.0 || p > 0.0 && q < 0.0
+    };
+    let mut pairs = (0..n).flat_map(|i| (i + 2..n).map(move |j| [i, j]));
+    let found = pairs.find(|[i, j]| parts(side(*i), side(*j)) && parts(side(*j), side(*i)));
+    found.map(|[i, j]| [i + 1, j + 1])
+}
+
 /// Whether a polygon is at least 1 mm wide across each of its sides.
 pub(super) fn has_an_area(polygon: &[[f64; 2]]) -> bool {
     let next = polygon.iter().cycle().skip(1);
@@ -123,4 +146,21 @@ pub(super) fn has_an_area(polygon: &[[f64; 2]]) -> bool {
         (length > 0.0).then_some(high - low)
     });
     widths.reduce(f64::min).is_some_and(|width| width >= THINNEST)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bow_tie_crosses_itself_and_a_closed_ring_does_not() {
+        assert_eq!(crossing(&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]), Some([1, 3]));
+        for ring in [
+            vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0]],
+            vec![[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [1.0, 0.5], [0.0, 2.0]],
+            vec![[0.0, 0.0], [1.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]],
+        ] {
+            assert_eq!(crossing(&ring), None, "{ring:?}");
+        }
+    }
 }

@@ -317,7 +317,9 @@ fn a_file_of_noise_is_refused_at_once() {
 fn a_mission_from_windows_is_the_same_mission() {
     let windows = format!("\u{feff}{}", FULL.replace('\n', "\r\n"));
     let (a, b) = (good(FULL), good(&windows));
-    assert_eq!((a.map, a.start, a.goal, a.path, a.limits), (b.map, b.start, b.goal, b.path, b.limits));
+    let limits = |limits: LimitsSpec| LimitsSpec { places: Vec::new(), ..limits };
+    assert_eq!((a.map, a.start, a.goal, a.path), (b.map, b.start, b.goal, b.path));
+    assert_eq!(limits(a.limits), limits(b.limits));
 }
 
 /// Deletes, repeats or replaces pieces of a good text.

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::fields::POINT;
+use super::solids;
 use crate::diag::shape::{Bounds, Field, Shape};
 use crate::diag::yaml::Node;
 use crate::diag::{Diagnostic, Source, Span};
@@ -49,8 +50,15 @@ pub(super) fn zones(map: &Node) -> Vec<SpeedZone> {
 
 /// Polygons without an area.
 pub(super) fn check(source: &Arc<Source>, map: &Node) -> Vec<Diagnostic> {
-    let flat = items(map).iter().enumerate().filter(|(_, node)| {
-        polygon(node).is_some_and(|polygon| polygon.len() >= 3 && !super::solids::has_an_area(&polygon))
+    let flat = items(map)
+        .iter()
+        .enumerate()
+        .filter(|(_, node)| polygon(node).is_some_and(|polygon| polygon.len() >= 3 && !solids::has_an_area(&polygon)));
+    let crossed = items(map).iter().enumerate().filter_map(|(i, node)| {
+        let [one, other] = polygon(node).filter(|p| solids::has_an_area(p)).and_then(|p| solids::crossing(&p))?;
+        let message = format!("`map.speed_zones[{i}].polygon_m` crosses itself: its sides {one} and {other} cross");
+        let at = node.get("polygon_m").unwrap_or(node).range.clone();
+        Some(Diagnostic::error("mission/speed-zone", message).at(&Span::new(source, at)).hint(solids::CROSSED))
     });
     let fault = |(i, node): (usize, &Node)| {
         let message = format!("`map.speed_zones[{i}].polygon_m` has no area: it is thinner than 1 mm");
@@ -58,5 +66,5 @@ pub(super) fn check(source: &Arc<Source>, map: &Node) -> Vec<Diagnostic> {
             .at(&Span::new(source, node.range.clone()))
             .hint("name the corners of an area in their order, such as `[[2, 1], [3, 1], [3, 2]]`")
     };
-    flat.map(fault).collect()
+    flat.map(fault).chain(crossed).collect()
 }

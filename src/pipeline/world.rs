@@ -1,7 +1,7 @@
 //! What a mission's text and files mean, before anything is planned.
 
 use super::{Inputs, StartFile, World};
-use crate::diag::{Diagnostic, Diagnostics, Span, nearest};
+use crate::diag::{Diagnostic, Diagnostics, Span, suggestion};
 use crate::geom::wrap_angle;
 use crate::map::{self, MapInputs};
 use crate::mission::{Mission, PoseSpec, ToleranceSpec};
@@ -34,11 +34,30 @@ pub fn world(inputs: &mut Inputs) -> Result<World, Diagnostics> {
         (Some(spec), Some(file)) => {
             let beside = file.beside.as_ref().map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
             let inputs = MapInputs { name: &file.name, bytes: &file.bytes, beside };
-            Some(map::parse(&inputs, spec, robot.top_over_all_postures())?.into())
+            let parsed = map::parse(&inputs, spec, robot.top_over_all_postures());
+            Some(parsed.map_err(|faults| asked_by(mission, faults))?.into())
         }
         _ => None,
     };
     Ok(World { robot, map })
+}
+
+/// Points faults between a map's file and the mission to what the mission asks for.
+fn asked_by(mission: &Mission, Diagnostics(mut faults): Diagnostics) -> Diagnostics {
+    let spans = &mission.spans;
+    for fault in &mut faults {
+        let asked = match fault.code {
+            "map/resolution-differs" => &spans.map_resolution,
+            "map/origin" if fault.at.is_none() => &spans.map_origin,
+            "map/height" => &spans.map_height,
+            _ => continue,
+        };
+        if let (Some(at), Some(file)) = (asked, &fault.file) {
+            fault.message = format!("{}, in `{file}`", fault.message);
+            fault.at = Some(at.clone());
+        }
+    }
+    Diagnostics(faults)
 }
 
 /// Where the motion of a command file ends: pose and joints, as replayed.
@@ -94,11 +113,8 @@ fn unknown_joints(mission: &Mission, robot: &RobotModel) -> Vec<Diagnostic> {
         let under = under.as_str();
         for (name, value) in pose.iter().flat_map(|p| &p.joints) {
             let Some(joint) = robot.joints.iter().find(|j| j.name == *name) else {
-                let hint = match nearest(name, names.iter().copied()) {
-                    Some(known) => format!("did you mean `{known}`?"),
-                    None if names.is_empty() => "this robot has no moving joint".to_owned(),
-                    None => format!("moving joints: {}", names.join(", ")),
-                };
+                let hint =
+                    suggestion(name, names.iter().copied(), "its moving joints are", "this robot has no moving joint");
                 let message = format!("`{under}.joints` names `{name}`, which is no moving joint of `{}`", robot.name);
                 faults.push(Diagnostic::error("mission/unknown-joint", message).maybe_at(span(under, name)).hint(hint));
                 continue;
@@ -108,11 +124,15 @@ fn unknown_joints(mission: &Mission, robot: &RobotModel) -> Vec<Diagnostic> {
                     "`{under}.joints.{name}` is {value}, outside its limits {} to {}",
                     joint.lower, joint.upper
                 );
-                faults.push(
-                    Diagnostic::error("mission/joint-out-of-limits", message)
-                        .maybe_at(span(under, name))
-                        .hint("angles are radians, or with `deg`"),
-                );
+                let degrees = |value: f64| (value.to_degrees() * 1e6).round() / 1e6;
+                let hint = if joint.prismatic {
+                    "write a value within them, in metres".to_owned()
+                } else {
+                    let [lower, upper] = [joint.lower, joint.upper].map(degrees);
+                    format!("write radians within them, or degrees from `{lower}deg` to `{upper}deg`")
+                };
+                let fault = Diagnostic::error("mission/joint-out-of-limits", message);
+                faults.push(fault.maybe_at(span(under, name)).hint(hint));
             }
         }
     }

@@ -2,6 +2,8 @@
 
 use std::str::FromStr;
 
+use crate::diag::nearest;
+
 /// Where commands go.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Address {
@@ -52,9 +54,12 @@ impl FromStr for Address {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let unknown = || {
+            let scheme = text.split(':').next().unwrap_or_default();
+            let near = nearest(scheme, ["stdout", "stdio", "udp", "can", "ros2", "zenoh", "foxglove"]);
             Err(format!(
                 "no sink `{text}`; there are stdout, stdio, udp://HOST:PORT, can:IFACE, can:udp://HOST:PORT, ros2, zenoh[:ENDPOINT] and \
-                 foxglove[://HOST:PORT]"
+                 foxglove[://HOST:PORT], such as {}",
+                near.unwrap_or("stdout")
             ))
         };
         if let Some(bus) = text.strip_prefix("can:") {

@@ -10,7 +10,7 @@ use super::spec::RobotSpec;
 use super::tree::{self, Tree};
 use super::urdf::Urdf;
 use super::{Body, BodyMotion, Files, Shape, shapes};
-use crate::diag::{Diagnostic, nearest};
+use crate::diag::{Diagnostic, suggestion};
 
 /// The bodies, and for every link its body and its pose in it.
 pub(super) struct Collapsed {
@@ -71,7 +71,8 @@ pub(super) fn collision_shapes(
                     let pose = body_from_link * tree::pose(&collision.origin) * centre;
                     if !shapes::finite(&pose, &convex) {
                         let message = format!("collision shape of link `{}` is not of finite size", link.name);
-                        faults.push(Diagnostic::error("robot/geometry", message).at(at));
+                        let hint = "look at the numbers of its <geometry> and <origin>: metres and radians";
+                        faults.push(Diagnostic::error("robot/geometry", message).at(at).hint(hint));
                     }
                     out.push(Shape { link: link.name.clone(), body, pose, convex });
                 }
@@ -84,7 +85,9 @@ pub(super) fn collision_shapes(
     }
     if out.is_empty() && faults.is_empty() {
         let fault = Diagnostic::error("robot/no-shapes", "the robot has no collision shape: nothing to keep clear");
-        faults.push(fault.at(&urdf.whole()).hint("give its links <collision> elements"));
+        faults.push(fault.at(&urdf.whole()).hint(
+            "add to a <link>, for example: <collision><geometry><box size=\"0.4 0.4 0.3\"/></geometry></collision>",
+        ));
     }
     out
 }
@@ -93,16 +96,13 @@ pub(super) fn collision_shapes(
 pub(super) fn check_links(spec: &RobotSpec, urdf: &Urdf, faults: &mut Vec<Diagnostic>) {
     let pairs = spec.ignore_pairs.iter().flatten().flatten().map(|name| ("ignore_pairs", name));
     for (key, name) in spec.ignore_links.iter().map(|name| ("ignore_links", name)).chain(pairs) {
-        let mut known = urdf.robot.links.iter().map(|l| l.name.as_str());
+        let known = urdf.robot.links.iter().map(|l| l.name.as_str());
         if known.clone().any(|link| link == name.value) {
             continue;
         }
         let message = format!("collision.{key} `{}`: no such link in {}", name.value, urdf.source.name);
-        let mut fault = Diagnostic::error("robot/unknown-link", message).maybe_at(name.span.as_ref());
-        if let Some(near) = nearest(&name.value, known.by_ref()) {
-            fault = fault.hint(format!("did you mean `{near}`?"));
-        }
-        faults.push(fault);
+        let hint = suggestion(&name.value, known, "its links are", "it has no link");
+        faults.push(Diagnostic::error("robot/unknown-link", message).maybe_at(name.span.as_ref()).hint(hint));
     }
 }
 

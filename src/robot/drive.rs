@@ -72,29 +72,38 @@ pub(super) fn drive(
         if !axle.horizontal() {
             let tilt = axle.axis.z.abs().min(1.0).asin().to_degrees();
             let message = format!("axis of drive wheel `{name}` is not horizontal: tilted by {tilt:.2} degrees");
-            faults.push(Diagnostic::error("robot/wheel-not-horizontal", message).at(&urdf.joint_spans[j]));
+            let fault = Diagnostic::error("robot/wheel-not-horizontal", message).at(&urdf.joint_spans[j]);
+            faults.push(
+                fault.hint(
+                    "correct its <axis> or <origin>: a wheel turns about a horizontal axis, such as xyz=\"0 1 0\"",
+                ),
+            );
             axes_good = false;
-        } else if !axle.parallel(&first.axis) {
+        } else if first.horizontal() && !axle.parallel(&first.axis) {
             let (other, degrees) = (&joints[wheels.left[0]].name, angle.to_degrees());
             let message = format!("axes of drive wheels `{other}` and `{name}` are not parallel: {degrees:.2} degrees");
-            faults.push(Diagnostic::error("robot/wheels-not-parallel", message).at(&urdf.joint_spans[j]));
+            let fault = Diagnostic::error("robot/wheels-not-parallel", message).at(&urdf.joint_spans[j]);
+            faults.push(fault.hint("correct the <axis> or <origin> of one of them: drive wheels turn about one line"));
             axes_good = false;
         }
     }
     let distance = across.norm();
     if distance < 1e-6 {
         let message = format!("the left and right drive wheels are at one place ({distance:.6} m apart)");
-        faults.push(Diagnostic::error("robot/zero-track", message).at(at));
+        let hint = "correct the <origin> of one of them in the URDF, or which joints robot.yaml names under `drive`";
+        faults.push(Diagnostic::error("robot/zero-track", message).at(at).hint(hint));
     } else if axes_good && !first.parallel(&across) {
         let off = first.axis.cross(&across).norm();
         let message =
             format!("drive wheels are not coaxial: {distance:.4} m apart, the right {off:.4} m off the left's axis");
-        faults.push(Diagnostic::error("robot/wheels-not-coaxial", message).at(at));
+        let hint = "correct the <origin> of one of them in the URDF: drive wheels turn about one line";
+        faults.push(Diagnostic::error("robot/wheels-not-coaxial", message).at(at).hint(hint));
     }
     let track_width = match &spec.track_width {
         Some(given) if !(given.value.is_finite() && given.value > 0.0) => {
             let message = format!("drive.track_width_m is {}, not above 0", given.value);
-            faults.push(Diagnostic::error("robot/zero-track", message).maybe_at(given.span.as_ref()));
+            let fault = Diagnostic::error("robot/zero-track", message).maybe_at(given.span.as_ref());
+            faults.push(fault.hint("write the distance between the drive wheels, such as `track_width_m: 0.32`"));
             given.value
         }
         Some(given) => given.value,
@@ -149,7 +158,8 @@ fn wheel_radius(
         (Some(given), _) if given.value.is_finite() && given.value > 0.0 => Some(given.value),
         (Some(given), _) => {
             let message = format!("drive.wheel_radius_m is {}, not above 0", given.value);
-            faults.push(Diagnostic::error("robot/wheel-radius", message).maybe_at(given.span.as_ref()));
+            let fault = Diagnostic::error("robot/wheel-radius", message).maybe_at(given.span.as_ref());
+            faults.push(fault.hint("write the wheels' radius, such as `wheel_radius_m: 0.08`"));
             None
         }
         (None, Some((_, radius))) if *radius > 0.0 => Some(*radius),
@@ -158,7 +168,7 @@ fn wheel_radius(
             let link = &urdf.robot.links[tree.child[joint]].name;
             let message = format!("wheel radius unknown: link `{link}` has no collision cylinder or sphere");
             let fault = Diagnostic::error("robot/wheel-radius", message).at(&urdf.joint_spans[joint]);
-            faults.push(fault.hint("give drive.wheel_radius_m in robot.yaml"));
+            faults.push(fault.hint("give it in robot.yaml, such as `drive: {…, wheel_radius_m: 0.08}`"));
             None
         }
     }

@@ -7,7 +7,7 @@ use urdf_rs::JointType;
 use super::spec::{RobotSpec, Written};
 use super::urdf::Urdf;
 use super::wheels::Wheels;
-use crate::diag::{Diagnostic, Diagnostics, nearest};
+use crate::diag::{Diagnostic, Diagnostics, suggestion};
 
 /// Value of a joint of the URDF.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,11 +46,9 @@ pub(super) fn named(urdf: &Urdf, name: &Written<String>, what: &str, faults: &mu
     let found = urdf.robot.joints.iter().position(|j| j.name == name.value);
     if found.is_none() {
         let message = format!("{what} `{}`: no such joint in {}", name.value, urdf.source.name);
-        let mut fault = Diagnostic::error("robot/unknown-joint", message).maybe_at(name.span.as_ref());
-        if let Some(near) = nearest(&name.value, urdf.robot.joints.iter().map(|j| j.name.as_str())) {
-            fault = fault.hint(format!("did you mean `{near}`?"));
-        }
-        faults.push(fault);
+        let known = urdf.robot.joints.iter().map(|j| j.name.as_str());
+        let hint = suggestion(&name.value, known, "its joints are", "it has no joint");
+        faults.push(Diagnostic::error("robot/unknown-joint", message).maybe_at(name.span.as_ref()).hint(hint));
     }
     found
 }
@@ -85,46 +83,61 @@ pub(super) fn roles(spec: &RobotSpec, urdf: &Urdf, wheels: &Wheels) -> Result<Ro
         if is_wheel(j) {
             "is a drive wheel".into()
         } else if let Some(mimic) = &joints[j].mimic {
-            format!("is a mimic of `{}`", mimic.joint)
+            format!("is a mimic of `{}`, and moves with it", mimic.joint)
         } else {
             "is of type fixed".into()
         }
     };
 
+    // Names of joints that may move or be held.
+    let able: Vec<&str> = (0..joints.len()).filter(|j| free(*j)).map(|j| joints[j].name.as_str()).collect();
+    let others = |verb: &str| match &able[..] {
+        [] => format!("this robot has no joint that can {verb}: remove it"),
+        names => {
+            let names: Vec<String> = names.iter().take(12).map(|name| format!("`{name}`")).collect();
+            format!("remove it; joints that can {verb} are {}", names.join(", "))
+        }
+    };
     let mut held: Vec<Option<f64>> = vec![None; joints.len()];
     for (name, value) in &spec.fixed {
         let Some(j) = named(urdf, name, "joints.fixed", &mut faults) else { continue };
         let [lower, upper] = range(urdf, j);
         let fault = if !free(j) {
-            Some(("robot/fixed-joint", format!("joints.fixed: `{}` {}", name.value, why_not(j))))
+            let message = format!("joints.fixed: `{}` {}", name.value, why_not(j));
+            Some(("robot/fixed-joint", message, others("be held")))
         } else if held[j].is_some() {
-            Some(("robot/fixed-joint", format!("joints.fixed: `{}` is named twice", name.value)))
+            let message = format!("joints.fixed: `{}` is named twice", name.value);
+            Some(("robot/fixed-joint", message, "keep one of the two".to_owned()))
         } else if !value.is_finite() || *value < lower - 1e-9 || *value > upper + 1e-9 {
             let message = format!("joints.fixed: `{}` at {value} is outside its limits {lower} to {upper}", name.value);
-            Some(("robot/fixed-outside", message))
+            let hint = "write a value within them: radians, metres, or degrees such as `90deg`";
+            Some(("robot/fixed-outside", message, hint.to_owned()))
         } else {
             held[j] = Some(*value);
             None
         };
-        faults.extend(fault.map(|(code, message)| Diagnostic::error(code, message).maybe_at(name.span.as_ref())));
+        let told = |(code, message, hint): (&'static str, String, String)| {
+            Diagnostic::error(code, message).maybe_at(name.span.as_ref()).hint(hint)
+        };
+        faults.extend(fault.map(told));
     }
 
     let mut moving = Vec::new();
     if let Some(names) = &spec.moving {
         for name in names {
             let Some(j) = named(urdf, name, "joints.moving", &mut faults) else { continue };
-            let why = if !free(j) {
-                why_not(j)
+            let (why, hint) = if !free(j) {
+                (why_not(j), others("move"))
             } else if spec.fixed.iter().any(|(fixed, _)| fixed.value == name.value) {
-                "is in joints.fixed too".into()
+                ("is in joints.fixed too".into(), "a joint either moves or is fixed: remove one of the two".to_owned())
             } else if moving.contains(&j) {
-                "is named twice".into()
+                ("is named twice".into(), "keep one of the two".to_owned())
             } else {
                 moving.push(j);
                 continue;
             };
             let message = format!("joints.moving: `{}` {why}", name.value);
-            faults.push(Diagnostic::error("robot/moving-joint", message).maybe_at(name.span.as_ref()));
+            faults.push(Diagnostic::error("robot/moving-joint", message).maybe_at(name.span.as_ref()).hint(hint));
         }
     } else {
         moving =
@@ -188,7 +201,8 @@ fn resolve(urdf: &Urdf, sources: &[Option<Followed>], joint: usize) -> Result<(u
         } else {
             continue;
         };
-        return Err(Box::new(Diagnostic::error("robot/mimic-cycle", message).at(&urdf.joint_spans[joint])));
+        let hint = "one of them must move by itself: remove its <mimic>, or correct its multiplier";
+        return Err(Box::new(Diagnostic::error("robot/mimic-cycle", message).at(&urdf.joint_spans[joint]).hint(hint)));
     }
     Ok((source, multiplier, offset))
 }

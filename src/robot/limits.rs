@@ -6,7 +6,7 @@ use super::spec::RobotSpec;
 use super::urdf::Urdf;
 use super::wheels::Wheels;
 use super::{BaseLimits, MotionLimits, MovingJoint};
-use crate::diag::{Diagnostic, Span, nearest};
+use crate::diag::{Diagnostic, Span, suggestion};
 use crate::mission::{ActuatorLimitsSpec, LimitsSpec};
 use urdf_rs::JointType;
 
@@ -38,8 +38,8 @@ impl Overrides<'_> {
         let whose = if mission.is_some() { "the mission's" } else { "robot.yaml's" };
         let what = if value.is_finite() { "not above 0" } else { "not finite" };
         let message = format!("{whose} limits.{part}.{key} is {value}: {what}");
-        let at = at.filter(|_| mission.is_none());
-        self.faults.push(Diagnostic::error("robot/limit-not-positive", message).maybe_at(at));
+        let hint = "write a number above 0, or leave it out";
+        self.faults.push(Diagnostic::error("robot/limit-not-positive", message).maybe_at(at).hint(hint));
         None
     }
 
@@ -98,21 +98,24 @@ impl Overrides<'_> {
         let layers = [("robot.yaml's", &self.spec.limits.joints), ("the mission's", &self.mission.joints)];
         for (layer, (whose, joints)) in layers.into_iter().enumerate() {
             for name in joints.keys() {
-                let at = if layer == 0 { self.span(name) } else { None };
+                let at = if layer == 0 { self.span(name) } else { self.mission_span(name) }.cloned();
                 let found = urdf.robot.joints.iter().position(|j| j.name == *name);
                 let Some(j) = found else {
                     let message = format!("{whose} limits.joints: no joint `{name}` in {}", urdf.source.name);
-                    let mut fault = Diagnostic::error("robot/unknown-joint", message).maybe_at(at);
-                    if let Some(near) = nearest(name, urdf.robot.joints.iter().map(|j| j.name.as_str())) {
-                        fault = fault.hint(format!("did you mean `{near}`?"));
-                    }
-                    self.faults.push(fault);
+                    let known = urdf.robot.joints.iter().map(|j| j.name.as_str());
+                    let hint = suggestion(name, known, "its joints are", "it has no joint");
+                    self.faults
+                        .push(Diagnostic::error("robot/unknown-joint", message).maybe_at(at.as_ref()).hint(hint));
                     continue;
                 };
                 if wheels.all().any(|w| w == j) {
-                    let message = format!("{whose} limits.joints: `{name}` is a drive wheel");
-                    let fault = Diagnostic::error("robot/limits-of-wheel", message).maybe_at(at);
-                    self.faults.push(fault.hint("wheels' limits are under limits.wheel"));
+                    let message = format!(
+                        "{whose} limits.joints: `{name}` is a drive wheel, whose limits are under `limits.wheel`"
+                    );
+                    let fault = Diagnostic::error("robot/limits-of-wheel", message).maybe_at(at.as_ref());
+                    self.faults.push(
+                        fault.hint("write `limits: {wheel: {speed_mps: …}}` for it: limits of the rim, of both wheels"),
+                    );
                 }
             }
         }
@@ -122,13 +125,18 @@ impl Overrides<'_> {
         self.spec.limit_joints.iter().find(|w| w.value == joint).and_then(|w| w.span.as_ref())
     }
 
+    fn mission_span(&self, joint: &str) -> Option<&'_ Span> {
+        self.mission.places.iter().find(|(name, _)| name == joint).map(|(_, at)| at)
+    }
+
     /// Range and limits of one URDF joint as overridden: its own, mimics not folded in.
     fn own(&mut self, urdf: &Urdf, joint: usize) -> ([f64; 2], MotionLimits) {
         let name = &urdf.robot.joints[joint].name;
         let [lower, upper] = range(urdf, joint);
         let none = ActuatorLimitsSpec::default();
         let layers = [&self.spec.limits.joints, &self.mission.joints].map(|l| l.get(name).unwrap_or(&none));
-        let at = self.span(name).cloned();
+        // Where both name the joint, the mission's word is the last.
+        let at = self.mission_span(name).or(self.span(name)).cloned();
         let part = format!("joints.{name}");
         let tight_lower = self.pick(&part, "lower", layers.map(|l| l.lower), false, at.as_ref()).unwrap_or(lower);
         let tight_upper = self.pick(&part, "upper", layers.map(|l| l.upper), false, at.as_ref()).unwrap_or(upper);
@@ -136,10 +144,13 @@ impl Overrides<'_> {
             let message = format!(
                 "limits of joint `{name}` may only be tightened: {tight_lower} to {tight_upper} goes beyond the URDF's {lower} to {upper}"
             );
-            self.faults.push(Diagnostic::error("robot/limit-loosened", message).maybe_at(at.as_ref()));
+            let hint =
+                "stay within the URDF's range, or change its <limit>; angles are radians, or degrees such as `90deg`";
+            self.faults.push(Diagnostic::error("robot/limit-loosened", message).maybe_at(at.as_ref()).hint(hint));
         } else if tight_lower > tight_upper {
             let message = format!("joint `{name}`: lower limit {tight_lower} is above the upper one, {tight_upper}");
-            self.faults.push(Diagnostic::error("robot/joint-limits", message).maybe_at(at.as_ref()));
+            let hint = "widen them; a joint that must not move is listed in robot.yaml's `joints.fixed`";
+            self.faults.push(Diagnostic::error("robot/joint-limits", message).maybe_at(at.as_ref()).hint(hint));
         }
         let motion = self.motion(&part, ["speed", "acceleration", "jerk"], layers, at.as_ref());
         ([tight_lower.max(lower), tight_upper.min(upper)], motion)
@@ -158,7 +169,7 @@ impl Overrides<'_> {
                 let fault = Diagnostic::error("robot/no-velocity-limit", message).at(&urdf.joint_spans[*source]);
                 self.faults.push(
                     fault.hint(format!(
-                        "add velocity=\"…\" to its <limit>, or limits.joints.{name}.speed to robot.yaml"
+                        "add velocity=\"…\" (rad/s, or m/s where it slides) to its <limit>, or limits.joints.{name}.speed to robot.yaml"
                     )),
                 );
             }
@@ -184,7 +195,10 @@ impl Overrides<'_> {
             limits.speed = limits.speed.or(default_speed);
             if lower > upper && self.faults.is_empty() {
                 let message = format!("no value of joint `{name}` keeps its own limits and those of its mimics");
-                self.faults.push(Diagnostic::error("robot/mimic-limits", message).at(&urdf.joint_spans[*source]));
+                let hint =
+                    "widen its <limit>, or those of the joints that mimic it, or correct their multiplier and offset";
+                let fault = Diagnostic::error("robot/mimic-limits", message).at(&urdf.joint_spans[*source]);
+                self.faults.push(fault.hint(hint));
             }
             let slides = |j: usize| joints[j].joint_type == JointType::Prismatic;
             let mut moved =

@@ -44,6 +44,12 @@ pub trait Files {
     /// The I/O error.
     fn read(&mut self, path: &Path) -> std::io::Result<Vec<u8>>;
 
+    /// The name of a file beside one that is not there, if it may have been meant.
+    fn nearest(&self, path: &Path) -> Option<String> {
+        let _ = path;
+        None
+    }
+
     /// Whether a file that is not under the robot's folder may be read.
     fn may_leave(&self, path: &Path) -> bool {
         let _ = path;

@@ -46,7 +46,8 @@ fn unreadable(path: &Path, error: &mesh::MeshError, at: &Span) -> Box<Diagnostic
         mesh::MeshError::Format(_) => {
             fault.hint("convert it to STL or OBJ (metres, same frame), or use a box or cylinder")
         }
-        _ => fault,
+        mesh::MeshError::Empty => fault.hint("export it again, with its triangles; or use a box or cylinder"),
+        _ => fault.hint("export it again, as STL or OBJ; or use a box or cylinder"),
     })
 }
 
@@ -98,19 +99,27 @@ fn find(
         let fault = Diagnostic::error("robot/mesh-outside", message).at(at);
         return Err(Box::new(fault.hint("copy it there, or allow the folder that it lies in: --allow-path DIR")));
     }
-    let mut reason = None;
+    let (mut reason, mut near) = (None, None);
     for path in &candidates {
         match files.read(path) {
             Ok(bytes) => return Ok((path.clone(), bytes)),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-            Err(error) => reason = reason.or(Some(format!("{}: {error}", path.display()))),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                near = near.or_else(|| files.nearest(path));
+            }
+            Err(error) => reason = reason.or(Some(format!("{}: {error}, expected a file", path.display()))),
         }
     }
+    let is_there = reason.is_some();
     let why = reason.unwrap_or_else(|| "not found".into());
     let fault = Diagnostic::error("robot/mesh", format!("mesh {name}: {why}")).at(at);
     let shown: Vec<_> = candidates.iter().take(4).map(|p| p.display().to_string()).collect();
+    let near = match near {
+        _ if is_there => "name the mesh file itself, .stl or .obj; ".to_owned(),
+        Some(near) => format!("did you mean `{near}`? "),
+        None => String::new(),
+    };
     Err(Box::new(fault.hint(format!(
-        "looked for {}{}",
+        "{near}looked for {}{}",
         shown.join(", "),
         if candidates.len() > 4 { ", …" } else { "" }
     ))))

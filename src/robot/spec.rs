@@ -195,7 +195,7 @@ impl Reader<'_> {
             track_width: self.number("drive", "track_width_m"),
             moving: self.get("joints", "moving").map(|n| self.names(Some(n))),
             fixed: self.fixed(),
-            limits: limits::read(self.root.get("limits")),
+            limits: limits::read(self.source, self.root.get("limits")),
             tolerance: tolerance::read(self.root.get("tolerance")),
             limit_joints: limits::joint_names(self.source, self.root.get("limits"))
                 .into_iter()

@@ -41,7 +41,8 @@ impl Tree {
                     "link `{}` is the child of two joints, `{}` and `{}`",
                     links[child[j]].name, joints[first].name, joint.name
                 );
-                faults.push(Diagnostic::error("robot/two-parents", message).at(&urdf.joint_spans[j]));
+                let hint = "a link hangs on one joint: remove one of the two, or give one another child";
+                faults.push(Diagnostic::error("robot/two-parents", message).at(&urdf.joint_spans[j]).hint(hint));
             }
         }
         if !faults.is_empty() {
@@ -69,7 +70,8 @@ impl Tree {
             let names: Vec<_> = lost.iter().take(6).map(|l| format!("`{}`", links[*l].name)).collect();
             let message = format!("links hang on each other in a circle: {}", names.join(", "));
             let at = &urdf.joint_spans[carrier[lost[0]].unwrap_or(0)];
-            return Err(Diagnostic::error("robot/cycle", message).at(at).into());
+            let hint = "a URDF is one tree: remove one of the joints between them";
+            return Err(Diagnostic::error("robot/cycle", message).at(at).hint(hint).into());
         }
         Ok(Self { root: roots[0], order, parent, child })
     }

@@ -10,10 +10,13 @@ use std::sync::Arc;
 
 use roxmltree::{Attribute, Document, Node};
 
-use crate::diag::{Diagnostic, Diagnostics, Source, Span, nearest};
+use crate::diag::{Diagnostic, Diagnostics, Source, Span, nearest, suggestion};
 
 /// Deepest nesting of elements that is read; real URDFs have about 6.
 const MAX_DEPTH: usize = 64;
+
+/// What to do about a URDF that passes the checks here and is refused by urdf-rs.
+const UNREADABLE: &str = "`check_urdf` of the package liburdfdom-tools may say more";
 
 /// A checked URDF: names are unique, references resolve, numbers are finite.
 pub(super) struct Urdf {
@@ -55,12 +58,18 @@ pub(super) fn read(name: &str, text: &str) -> Result<Urdf, Diagnostics> {
     let root = document.root_element();
     if !root.has_tag_name("robot") {
         let message = format!("the root element is <{}>, not <robot>", root.tag_name().name());
-        return Err(Diagnostic::error("robot/not-urdf", message).at(&check.start(root)).into());
+        let hint = match root.tag_name().name() {
+            "sdf" => "SDF is another format: convert it to a URDF",
+            _ => "a URDF begins with <robot name=\"…\">: name the robot's URDF",
+        };
+        return Err(Diagnostic::error("robot/not-urdf", message).at(&check.start(root)).hint(hint).into());
     }
     let links: Vec<Node> = root.children().filter(|n| n.has_tag_name("link")).collect();
     let joints: Vec<Node> = root.children().filter(|n| n.has_tag_name("joint")).collect();
     if links.is_empty() {
-        check.fault("robot/no-links", "the URDF has no <link>", &check.start(root));
+        let hint = "it needs one at least: <link name=\"base_link\">";
+        let fault = Diagnostic::error("robot/no-links", "the URDF has no <link>").at(&check.start(root)).hint(hint);
+        return Err(fault.into());
     }
     let link_names = check.names(&links, "link");
     let joint_names = check.names(&joints, "joint");
@@ -83,7 +92,7 @@ pub(super) fn read(name: &str, text: &str) -> Result<Urdf, Diagnostics> {
     let has_limit = joints.iter().map(|n| n.children().any(|c| c.has_tag_name("limit"))).collect();
     let robot = urdf_rs::read_from_string(&reduced(text, root)).map_err(|error| {
         let message = format!("not a URDF that can be read: {error}");
-        Diagnostic::error("robot/unreadable-urdf", message).at(&check.start(root))
+        Diagnostic::error("robot/unreadable-urdf", message).at(&check.start(root)).hint(UNREADABLE)
     })?;
     if robot.links.len() != links.len() || robot.joints.len() != joints.len() {
         let message = format!(
@@ -93,21 +102,76 @@ pub(super) fn read(name: &str, text: &str) -> Result<Urdf, Diagnostics> {
             robot.links.len(),
             robot.joints.len()
         );
-        return Err(Diagnostic::error("robot/unreadable-urdf", message).at(&check.start(root)).into());
+        return Err(Diagnostic::error("robot/unreadable-urdf", message).at(&check.start(root)).hint(UNREADABLE).into());
     }
     Ok(Urdf { source: source.clone(), robot, link_spans, collision_spans, joint_spans, has_limit })
 }
 
 fn syntax_error(source: &Arc<Source>, error: &roxmltree::Error) -> Diagnostic {
     let at = position(&source.text, error.pos().row as usize, error.pos().col as usize);
-    let found = Diagnostic::error("robot/xml", error).at(&character(source, at));
-    if matches!(error, roxmltree::Error::DtdDetected) {
-        found.hint("a URDF needs no <!DOCTYPE> and no entities: remove them")
-    } else if source.text.contains("xacro:") {
-        found.hint(expand(&source.name))
-    } else {
-        found
+    let fault = |message: String, at: &Span, hint: String| Diagnostic::error("robot/xml", message).at(at).hint(hint);
+    let there = character(source, at);
+    if source.text.contains("xacro:") {
+        return fault(format!("not valid XML: {error}"), &there, expand(&source.name));
     }
+    match error {
+        roxmltree::Error::DtdDetected => fault(
+            "the URDF has a <!DOCTYPE>, which none needs".into(),
+            &source.text.find("<!DOCTYPE").map_or(there, |at| Span::new(source, at..at + "<!DOCTYPE".len())),
+            "a URDF needs no <!DOCTYPE> and no entities: remove them".into(),
+        ),
+        roxmltree::Error::NoRootNode => fault(
+            "the URDF has no element, expected a <robot>".into(),
+            &there,
+            "a URDF begins with <robot name=\"…\"> and ends with </robot>".into(),
+        ),
+        roxmltree::Error::UnclosedRootNode => unclosed(source),
+        roxmltree::Error::UnexpectedCloseTag(expected, actual, _) => fault(
+            format!("not valid XML: found </{actual}>, expected </{expected}>"),
+            &there,
+            format!("close <{expected}> first, or remove the closing tag </{actual}>"),
+        ),
+        roxmltree::Error::DuplicatedAttribute(name, _) => fault(
+            format!("not valid XML: the attribute '{name}' is there twice, expected once"),
+            &there,
+            format!("keep one `{name}=\"…\"`"),
+        ),
+        other => {
+            // Its own words end in the place, which is shown.
+            let words = other.to_string();
+            let words = words.rsplit_once(" at ").map_or(words.as_str(), |(words, _)| words);
+            let hint = "look at the tag there: values are in quotes, `name=\"value\"`, and every <tag> ends in /> or has its </tag>";
+            fault(format!("not valid XML: {words}"), &there, hint.into())
+        }
+    }
+}
+
+/// A text that ends before its elements do: names the innermost one and points to its tag.
+fn unclosed(source: &Arc<Source>) -> Diagnostic {
+    let text = &source.text;
+    let (mut open, mut at): (Vec<Range<usize>>, usize) = (Vec::new(), 0);
+    while let Some(start) = text[at..].find('<').map(|i| at + i) {
+        let rest = &text[start..];
+        let ends = |with: &str| rest.find(with).map_or(text.len(), |i| start + i + with.len());
+        at = match rest {
+            _ if rest.starts_with("<!--") => ends("-->"),
+            _ if rest.starts_with("<![CDATA[") => ends("]]>"),
+            _ if rest.starts_with("<?") => ends("?>"),
+            _ => ends(">"),
+        };
+        if rest.starts_with("</") {
+            open.pop();
+        } else if !rest.starts_with("<!") && !rest.starts_with("<?") && !text[..at].ends_with("/>") {
+            let name =
+                rest[1..].find(|c: char| c.is_whitespace() || c == '>' || c == '/').map_or(rest.len(), |i| i + 1);
+            open.push(start..start + name);
+        }
+    }
+    let tag = open.last().cloned().unwrap_or(0..0);
+    let name = text[tag.clone()].trim_start_matches('<');
+    let message = format!("not valid XML: the file ends within <{name}>, expected </{name}>");
+    let hint = format!("add the closing tag </{name}>, or was the file cut off?");
+    Diagnostic::error("robot/xml", message).at(&Span::new(source, tag)).hint(hint)
 }
 
 /// A fault where elements are left that xacro would have replaced.
@@ -153,9 +217,10 @@ fn check_depth(source: &Arc<Source>, document: &Document) -> Result<(), Diagnost
     for node in document.descendants() {
         let depth = node.parent().and_then(|p| depths.get(p.id().get_usize())).map_or(0, |d| d + 1);
         if depth > MAX_DEPTH {
-            let message = format!("elements are nested more than {MAX_DEPTH} deep");
+            let message = format!("elements are nested more than {MAX_DEPTH} deep, a URDF's are about 6");
             let at = character(source, node.range().start);
-            return Err(Diagnostic::error("robot/xml-depth", message).at(&at).into());
+            let hint = "look for a closing tag that is missing further up";
+            return Err(Diagnostic::error("robot/xml-depth", message).at(&at).hint(hint).into());
         }
         depths.resize(node.id().get_usize(), 0);
         depths.push(depth);
@@ -170,8 +235,8 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    fn fault(&mut self, code: &'static str, message: impl ToString, at: &Span) {
-        self.faults.push(Diagnostic::error(code, message).at(at));
+    fn fault(&mut self, code: &'static str, message: impl ToString, at: &Span, hint: impl Into<String>) {
+        self.faults.push(Diagnostic::error(code, message).at(at).hint(hint));
     }
 
     /// The opening tag, up to its name.
@@ -195,11 +260,15 @@ impl Check<'_> {
         let mut names = BTreeMap::new();
         for node in nodes {
             match node.attribute("name").filter(|name| !name.is_empty()) {
-                None => self.fault("robot/no-name", format!("a <{kind}> without a name"), &self.start(*node)),
+                None => {
+                    let message = format!("a <{kind}> without a name, which every {kind} needs");
+                    self.fault("robot/no-name", message, &self.start(*node), format!("write <{kind} name=\"…\">"));
+                }
                 Some(name) => {
                     if names.insert(name, *node).is_some() {
                         let message = format!("{kind} `{name}` is there twice");
-                        self.fault("robot/doubled-name", message, &self.name_span(*node));
+                        let hint = format!("rename one of them, or remove it: every {kind} has its own name");
+                        self.fault("robot/doubled-name", message, &self.name_span(*node), hint);
                     }
                 }
             }
@@ -213,8 +282,15 @@ impl Check<'_> {
             let geometries: Vec<Node> = collision.children().filter(|n| n.has_tag_name("geometry")).collect();
             let shapes: Vec<Node> = geometries.iter().flat_map(|g| g.children().filter(Node::is_element)).collect();
             let ([_], [shape]) = (&geometries[..], &shapes[..]) else {
-                let message = "a <collision> needs one <geometry> with one shape in it";
-                self.fault("robot/geometry", message, &self.start(collision));
+                let found = match (geometries.len(), shapes.len()) {
+                    (0, _) => "no <geometry>".to_owned(),
+                    (1, 0) => "no shape".to_owned(),
+                    (1, n) => format!("{n} shapes"),
+                    (n, _) => format!("{n} <geometry>"),
+                };
+                let message = format!("a <collision> needs one <geometry> with one shape in it, and has {found}");
+                let hint = "for example <geometry><box size=\"0.4 0.4 0.3\"/></geometry>; for two shapes write two <collision>";
+                self.fault("robot/geometry", message, &self.start(collision), hint);
                 continue;
             };
             self.shape(*shape);
@@ -231,14 +307,19 @@ impl Check<'_> {
             }
             "mesh" => {
                 if shape.attribute("filename").is_none_or(|name| name.trim().is_empty()) {
-                    self.fault("robot/geometry", "a <mesh> without a filename", &self.start(shape));
+                    let hint = "write <mesh filename=\"hull.stl\"/>, relative to the URDF or package://";
+                    self.fault("robot/geometry", "a <mesh> without a filename", &self.start(shape), hint);
                 }
                 self.numbers(shape, "scale", 3, false);
             }
             other => {
                 let message = format!("collision shape <{other}> is not supported");
                 let fault = Diagnostic::error("robot/geometry", message).at(&self.start(shape));
-                self.faults.push(fault.hint("use box, cylinder, sphere or mesh"));
+                let hint = match nearest(other, ["box", "cylinder", "sphere", "mesh"]) {
+                    Some(near) => format!("did you mean <{near}>? use box, cylinder, sphere or mesh"),
+                    None => "use box, cylinder, sphere or mesh".to_owned(),
+                };
+                self.faults.push(fault.hint(hint));
             }
         }
     }
@@ -246,11 +327,19 @@ impl Check<'_> {
     fn joint(&mut self, joint: Node, links: &BTreeMap<&str, Node>, joints: &BTreeMap<&str, Node>) {
         let name = joint.attribute("name").unwrap_or_default();
         match joint.attribute_node("type") {
-            None => self.fault("robot/joint-type", format!("joint `{name}` has no type"), &self.name_span(joint)),
+            None => {
+                let hint = "add type=\"fixed\", \"revolute\", \"continuous\" or \"prismatic\"";
+                self.fault("robot/joint-type", format!("joint `{name}` has no type"), &self.name_span(joint), hint);
+            }
             Some(kind) if !matches!(kind.value(), "fixed" | "revolute" | "continuous" | "prismatic") => {
                 let message = format!("joint `{name}`: type `{}` is not supported", kind.value());
                 let fault = Diagnostic::error("robot/joint-type", message).at(&self.attribute_span(&kind));
-                self.faults.push(fault.hint("use fixed, revolute, continuous or prismatic"));
+                let types = "fixed, revolute, continuous or prismatic";
+                let hint = match nearest(kind.value(), ["fixed", "revolute", "continuous", "prismatic"]) {
+                    Some(near) => format!("did you mean `{near}`? types are {types}"),
+                    None => format!("use {types}"),
+                };
+                self.faults.push(fault.hint(hint));
             }
             Some(_) => {}
         }
@@ -258,7 +347,7 @@ impl Check<'_> {
             self.only_one(joint, end);
             self.reference(joint, end, "link", links, "link");
         }
-        for part in ["origin", "axis", "limit", "mimic"] {
+        for part in ["axis", "limit", "mimic"] {
             self.only_one(joint, part);
         }
         self.origin(joint);
@@ -269,7 +358,8 @@ impl Check<'_> {
             && kind != "fixed"
             && xyz.iter().map(|v| v * v).sum::<f64>().sqrt() < 1e-9
         {
-            self.fault("robot/axis", format!("joint `{name}` has an axis of zero length"), &self.start(axis));
+            let message = format!("joint `{name}` has an axis of zero length");
+            self.fault("robot/axis", message, &self.start(axis), "write a direction, such as xyz=\"0 0 1\"");
         }
         if let Some(limit) = joint.children().find(|n| n.has_tag_name("limit")) {
             let bounds = ["lower", "upper"].map(|key| self.numbers(limit, key, 1, false));
@@ -278,11 +368,12 @@ impl Check<'_> {
                 && lower[0] > upper[0]
             {
                 let message = format!("joint `{name}`: lower limit {} is above the upper one, {}", lower[0], upper[0]);
-                self.fault("robot/joint-limits", message, &self.start(limit));
+                self.fault("robot/joint-limits", message, &self.start(limit), "swap `lower` and `upper`");
             }
-            if self.numbers(limit, "velocity", 1, false).is_some_and(|v| v[0] < 0.0) {
-                let message = format!("joint `{name}` has a negative velocity limit");
-                self.fault("robot/limit-not-positive", message, &self.start(limit));
+            if let Some(v) = self.numbers(limit, "velocity", 1, false).filter(|v| v[0] < 0.0) {
+                let message = format!("joint `{name}` has a negative velocity limit, {}", v[0]);
+                let hint = "write its greatest speed to either side, above 0: rad/s, or m/s of a prismatic joint";
+                self.fault("robot/limit-not-positive", message, &self.start(limit), hint);
             }
         }
         if let Some(mimic) = joint.children().find(|n| n.has_tag_name("mimic")) {
@@ -295,7 +386,8 @@ impl Check<'_> {
     fn only_one(&mut self, node: Node, tag: &str) {
         if let Some(second) = node.children().filter(|n| n.has_tag_name(tag)).nth(1) {
             let name = node.attribute("name").unwrap_or_default();
-            self.fault("robot/doubled-element", format!("`{name}` has more than one <{tag}>"), &self.start(second));
+            let message = format!("`{name}` has more than one <{tag}>");
+            self.fault("robot/doubled-element", message, &self.start(second), "keep one of them");
         }
     }
 
@@ -304,16 +396,19 @@ impl Check<'_> {
         let element = node.children().find(|n| n.has_tag_name(tag));
         let Some(attribute) = element.and_then(|e| e.attribute_node(key)) else {
             let message = format!("joint `{name}` has no <{tag} {key}=…>");
-            self.fault("robot/missing-element", message, &self.name_span(node));
+            let hint = format!("add <{tag} {key}=\"…\"/> with the name of a {kind}");
+            self.fault("robot/missing-element", message, &self.name_span(node), hint);
             return;
         };
         if !known.contains_key(attribute.value()) {
             let message = format!("joint `{name}`: no {kind} `{}` in this URDF", attribute.value());
-            let mut fault = Diagnostic::error("robot/unknown-name", message).at(&self.attribute_span(&attribute));
-            if let Some(near) = nearest(attribute.value(), known.keys().copied()) {
-                fault = fault.hint(format!("did you mean `{near}`?"));
-            }
-            self.faults.push(fault);
+            let hint = suggestion(
+                attribute.value(),
+                known.keys().copied(),
+                &format!("its {kind}s are"),
+                &format!("it has no {kind}"),
+            );
+            self.fault("robot/unknown-name", message, &self.attribute_span(&attribute), hint);
         }
     }
 
@@ -328,8 +423,9 @@ impl Check<'_> {
 
     fn not_negative(&mut self, node: Node, key: &str, count: usize) {
         if self.numbers(node, key, count, true).is_some_and(|v| v.iter().any(|v| *v < 0.0)) {
-            let message = format!("<{}>: {key} is negative", node.tag_name().name());
-            self.fault("robot/geometry", message, &self.start(node));
+            let written = node.attribute(key).unwrap_or_default();
+            let message = format!("<{}>: {key}=\"{written}\" is negative", node.tag_name().name());
+            self.fault("robot/geometry", message, &self.start(node), "sizes are metres, 0 or more");
         }
     }
 
@@ -338,7 +434,7 @@ impl Check<'_> {
         let Some(attribute) = node.attribute_node(key) else {
             if required {
                 let message = format!("<{}> has no {key}", node.tag_name().name());
-                self.fault("robot/missing-element", message, &self.start(node));
+                self.fault("robot/missing-element", message, &self.start(node), format!("add {}", example(key)));
             }
             return None;
         };
@@ -348,15 +444,33 @@ impl Check<'_> {
             _ => {
                 let what = if count == 1 { "one finite number".into() } else { format!("{count} finite numbers") };
                 let message = format!("{key}=\"{}\": expected {what}", attribute.value());
-                let mut fault = Diagnostic::error("robot/not-a-number", message).at(&self.attribute_span(&attribute));
-                if attribute.value().contains("${") {
-                    fault = fault.hint(format!("this looks like xacro; {}", expand(&self.source.name)));
-                }
-                self.faults.push(fault);
+                let hint = if attribute.value().contains("${") {
+                    format!("this looks like xacro; {}", expand(&self.source.name))
+                } else if attribute.value().contains(',') {
+                    format!("numbers are separated by blanks, not commas: {}", example(key))
+                } else {
+                    format!("for example {}", example(key))
+                };
+                self.fault("robot/not-a-number", message, &self.attribute_span(&attribute), hint);
                 None
             }
         }
     }
+}
+
+/// A good attribute.
+fn example(key: &str) -> String {
+    let value = match key {
+        "size" => "0.4 0.4 0.3",
+        "xyz" => "0 0 1",
+        "rpy" => "0 0 1.57",
+        "quat_xyzw" => "0 0 0 1",
+        "scale" => "0.001 0.001 0.001",
+        "lower" => "-1.57",
+        "upper" => "1.57",
+        _ => "0.1",
+    };
+    format!("{key}=\"{value}\"")
 }
 
 /// The text with all that this stage does not use blanked, and `velocity="0"` (none) where a `<limit>` leaves it out: URDF asks

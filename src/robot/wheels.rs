@@ -56,10 +56,14 @@ pub(super) fn wheels(spec: &RobotSpec, urdf: &Urdf, tree: &Tree) -> Result<Wheel
                     if !matches!(joint.joint_type, JointType::Continuous | JointType::Revolute) {
                         let kind = format!("{:?}", joint.joint_type).to_lowercase();
                         let message = format!("drive wheel `{}` is a {kind} joint, which does not turn", joint.name);
-                        faults.push(Diagnostic::error("robot/wheel-type", message).maybe_at(name.span.as_ref()));
+                        let hint =
+                            "name joints of type continuous (or revolute), or change the joint's type in the URDF";
+                        let fault = Diagnostic::error("robot/wheel-type", message).maybe_at(name.span.as_ref());
+                        faults.push(fault.hint(hint));
                     } else if seen.contains(&j) {
                         let message = format!("drive wheel `{}` is named twice", joint.name);
-                        faults.push(Diagnostic::error("robot/wheel-twice", message).maybe_at(name.span.as_ref()));
+                        let fault = Diagnostic::error("robot/wheel-twice", message).maybe_at(name.span.as_ref());
+                        faults.push(fault.hint("a wheel has one joint and one side: remove one of the two"));
                     } else {
                         seen.push(j);
                         found.push(j);

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::cli::compile::mission_name;
 use crate::cli::output::spelled;
 use crate::diag::{Diagnostic, Diagnostics};
+use crate::inputs::missing;
 
 /// A mission's file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -67,7 +68,8 @@ fn unreadable(path: &Path, error: &std::io::Error) -> Diagnostic {
     match error.kind() {
         std::io::ErrorKind::NotFound => {
             let fault = Diagnostic::error("build/not-there", format!("no such file or folder: `{name}`"));
-            fault.hint("name missions, or folders that hold missions; without any, `missions` is built")
+            let near = missing(path).1.map_or(String::new(), |near| format!("{near} "));
+            fault.hint(format!("{near}name missions, or folders that hold missions; without any, `missions` is built"))
         }
         _ => Diagnostic::error("build/unreadable", format!("cannot read `{name}`: {error}"))
             .hint("check its permissions"),

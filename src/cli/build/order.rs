@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::find::Found;
 use crate::diag::{Diagnostic, Diagnostics};
+use crate::mission;
 
 /// Missions in an order in which each comes after the one that it starts from; else as they were.
 pub struct Order {
@@ -64,7 +65,11 @@ fn cycle(missions: &[Found], chain: &[usize]) -> Diagnostics {
         }
     };
     let hint = "one of them must say where it starts by itself: `start: {x_m: 0.5, y_m: 0.5, yaw: 0deg}`";
-    Diagnostic::error("build/cycle", message).hint(hint).into()
+    // Where the first of them says so.
+    let path = &missions[chain[0]].path;
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let at = mission::parse(&path.display().to_string(), &text).ok().and_then(|mission| mission.spans.start_file);
+    Diagnostic::error("build/cycle", message).maybe_at(at.as_ref()).hint(hint).into()
 }
 
 #[cfg(test)]

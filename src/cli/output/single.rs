@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::Path;
 
-use super::{flush_folder, room};
+use super::{flush_folder, reason, room};
 use crate::diag::{Diagnostic, Diagnostics};
 
 /// Makes a folder and those above it.
@@ -13,7 +13,7 @@ use crate::diag::{Diagnostic, Diagnostics};
 /// It cannot be made.
 pub fn make_folder(path: &Path) -> Result<(), Diagnostics> {
     fs::create_dir_all(path).map_err(|error| {
-        let message = format!("cannot make folder `{}`: {error}", path.display());
+        let message = format!("cannot make folder `{}`: {}", path.display(), reason(&error));
         let hint = room(&error).unwrap_or_else(|| "the folder above must be writable".to_owned());
         Diagnostic::error("output/io", message).hint(hint).into()
     })
@@ -25,7 +25,7 @@ pub fn make_folder(path: &Path) -> Result<(), Diagnostics> {
 /// It cannot be written; an older one is then as it was.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Diagnostics> {
     replace(path, bytes).map_err(|error| {
-        let message = format!("cannot write `{}`: {error}", path.display());
+        let message = format!("cannot write `{}`: {}", path.display(), reason(&error));
         let hint = room(&error).unwrap_or_else(|| "the folder must exist and be writable".to_owned());
         Diagnostic::error("output/io", message).hint(hint).into()
     })

@@ -64,7 +64,7 @@ fn columns_must_be_all_there_once_and_known() {
     let cases = [
         ("v_mps,", "v_mps2,", "unknown column `v_mps2`"),
         ("v_mps,", "x_m,", "column `x_m` is there twice"),
-        ("joint.blade.vel_rad_s,", "joint.blade.vel_mps,", "no column `joint.blade.vel_rad_s`"),
+        ("joint.blade.vel_rad_s,", "joint.blade.vel_mps,", "without `joint.blade.vel_rad_s`"),
         ("joint.blade.pos_rad,", "joint.blade.pos_deg,", "unknown column `joint.blade.pos_deg`"),
         ("joint.blade.pos_rad,", "joint..pos_rad,", "unknown column `joint..pos_rad`"),
         ("yaw_rad", "yaw", "unknown column `yaw`"),

@@ -81,7 +81,7 @@ fn start_and_goal_are_three_to_eight_metres_apart_and_the_whole_robot_is_clear_t
         }
         assert_ne!(scene.start.joints, scene.goal.joints);
     }
-    set.fits(&robot).expect("joints of the robot, within their ranges");
+    set.fits(&robot, "").expect("joints of the robot, within their ranges");
 }
 
 #[test]

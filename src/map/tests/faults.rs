@@ -68,16 +68,25 @@ fn faults_in_a_pcd_header_are_found_together_with_their_lines() {
 fn faults_in_rows_have_their_line_in_the_file() {
     let head = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 2\nWIDTH 2\nHEIGHT 1\nDATA ascii\n";
     let message = |rows: &str| bad("a.pcd", (head.to_owned() + rows).as_bytes(), &spec([0.0, 1.0])).remove(0).1;
-    assert_eq!(message("1 2 3\n\n1 2\n"), "line 10 has 2 columns, expected 3: `1 2`");
-    assert_eq!(message("1 2 3\n1 two 3\n"), "line 9: `two` is not a number");
+    assert_eq!(message("1 2 3\n\n1 2\n"), "`1 2` has 2 columns, expected 3");
+    assert_eq!(message("1 2 3\n1 two 3\n"), "`two` is not a number");
     assert_eq!(message("1 2 3\n"), "2 points promised, but 1 are there");
     assert_eq!(message("1 2 3\n1 2 3\n1 2 3"), "2 points promised, but 3 are there");
     let table = |text: &str| bad("a.csv", text.as_bytes(), &spec([0.0, 1.0])).remove(0);
-    assert_eq!(table("x,y,z\n1,2,3\n1,2").1, "line 3 has 2 columns, expected x, y and z: `1,2`");
-    assert_eq!(table("x,y,z\n1,,3\n").1, "line 2: `` is not a number");
+    assert_eq!(table("x,y,z\n1,2,3\n1,2").1, "`1,2` has 2 columns, expected x, y and z");
+    assert_eq!(table("x,y,z\n1,,3\n").1, "an empty cell is not a number");
     assert_eq!(table("1,5;2,5;0,1\n").0, "map/row");
-    assert_eq!(table("x,y,height\n1,2,3\n").1, "no column `z`: the file has x, y, height");
+    assert_eq!(table("x,y,height\n1,2,3\n").1, "no column `z`: the header has x, y, height");
     assert_eq!(table("3\n1 2 3\n").0, "map/row");
+    let place = |text: &str| {
+        let faults = parse(&inputs("a.csv", text.as_bytes()), &spec([0.0, 1.0]), 1.0).expect_err("bad").0;
+        let at = faults[0].at.clone().expect("a place");
+        (at.source.text[..at.range.start].matches('\n').count() + 1, at.source.text[at.range].to_owned())
+    };
+    assert_eq!(place("x,y,z\n1,2,3\n\n1twoo,0, two\n"), (4, "1twoo".into()));
+    assert_eq!(place("x,y,z\n1,2,3\n\n1,0, two\n"), (4, "two".into()));
+    assert_eq!(place("\u{feff}x,y,height\n1,2,3\n"), (1, "x,y,height".into()));
+    assert_eq!(place("x,y,z\r\n  1 2\r\n"), (2, "1 2".into()));
     assert_eq!(table("x,y,z\n").0, "map/no-points");
     assert_eq!(table("").0, "map/no-points");
     assert_eq!(table("nan nan nan\n1 inf 0\n").1, "no points: the file has 2, of which 2 are not finite");

@@ -154,10 +154,13 @@ fn the_missions_origin_wins_and_its_resolution_must_agree() {
 #[test]
 fn the_file_beside_is_named_from_the_maps_folder() {
     let voxels = voxel_files().remove(0);
-    assert_eq!(beside("maps/v.npy", &voxels), Ok(Some((PathBuf::from("maps/v.json"), false))));
+    assert_eq!(beside("maps/v.npy", &voxels), Ok(Some((PathBuf::from("maps/v.json"), None))));
     assert_eq!(beside("maps/p.npy", &npy("<f8", false, &[0, 3], &[])), Ok(None));
     assert_eq!(beside("maps/p.pcd", b""), Ok(None));
     let sheet = b"image: pictures/a.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n";
-    assert_eq!(beside("maps/a.yaml", sheet), Ok(Some((PathBuf::from("maps/pictures/a.pgm"), true))));
+    let (image, named) = beside("maps/a.yaml", sheet).expect("good").expect("an image");
+    let named = named.expect("a place");
+    assert_eq!(image, PathBuf::from("maps/pictures/a.pgm"));
+    assert!(named.source.text[named.range].starts_with("pictures/a.pgm"));
     assert!(beside("maps/a.yaml", b"image: [\n").is_err());
 }

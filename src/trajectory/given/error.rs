@@ -39,7 +39,7 @@ pub enum GivenError {
         parameter: f64,
     },
     /// A CSV file without rows enough.
-    #[error("{name}: a path needs two rows or more, this one has {rows}")]
+    #[error("a path needs two rows or more, this one has {rows}")]
     TooFewRows {
         /// The file.
         name: String,
@@ -47,15 +47,17 @@ pub enum GivenError {
         rows: usize,
     },
     /// A CSV file without a column that it must have.
-    #[error("{name}: no column `{column}`")]
+    #[error("no column `{column}`: the header has {found}")]
     MissingColumn {
-        /// The file.
-        name: String,
         /// Its name.
         column: &'static str,
+        /// The columns that are there.
+        found: String,
+        /// The header.
+        at: Span,
     },
     /// A column that means nothing.
-    #[error("line {line}: unknown column `{column}`")]
+    #[error("unknown column `{column}`")]
     UnknownColumn {
         /// From 1.
         line: usize,
@@ -67,7 +69,7 @@ pub enum GivenError {
         at: Span,
     },
     /// A column twice.
-    #[error("line {line}: column `{column}` is there twice")]
+    #[error("column `{column}` is there twice")]
     DoubleColumn {
         /// From 1.
         line: usize,
@@ -77,7 +79,7 @@ pub enum GivenError {
         at: Span,
     },
     /// Not CSV, such as bytes that are not UTF-8 or a row of another length.
-    #[error("line {line}: {found} cells, the header has {expected}")]
+    #[error("the row has {found} cells, the header has {expected}")]
     Ragged {
         /// From 1.
         line: usize,
@@ -89,7 +91,7 @@ pub enum GivenError {
         at: Span,
     },
     /// A cell that is no finite number.
-    #[error("line {line}: `{text}` in column `{column}` is not a finite number")]
+    #[error("`{text}` in column `{column}` is not a finite number")]
     NotANumber {
         /// From 1.
         line: usize,
@@ -101,7 +103,7 @@ pub enum GivenError {
         at: Span,
     },
     /// A coordinate that no robot drives to.
-    #[error("line {line}: `{column}` is {value:e} m: farther than {limit} m from the origin")]
+    #[error("`{column}` is {value:e} m: farther than {limit} m from the origin")]
     FarAway {
         /// From 1.
         line: usize,
@@ -115,7 +117,7 @@ pub enum GivenError {
         at: Span,
     },
     /// Two rows at one point: the chord between them has no direction.
-    #[error("line {line}: the same point as in the row before")]
+    #[error("the same point as in the row before")]
     RepeatedPoint {
         /// From 1.
         line: usize,
@@ -123,7 +125,7 @@ pub enum GivenError {
         at: Span,
     },
     /// The spline through the rows has a cusp.
-    #[error("line {line}: the path turns back on itself at or after this row: its curve has no direction there")]
+    #[error("the path turns back on itself at or after this row: its curve has no direction there")]
     TurnsBack {
         /// From 1.
         line: usize,
@@ -131,7 +133,7 @@ pub enum GivenError {
         at: Span,
     },
     /// A joint's spline leaves the joint's range.
-    #[error("line {line}: `{joint}` reaches {value:.6} on the way to the next row, outside {lower:.6} … {upper:.6}")]
+    #[error("`{joint}` reaches {value:.6} on the way to the next row, outside {lower:.6} … {upper:.6}")]
     JointRange {
         /// From 1.
         line: usize,
@@ -152,25 +154,33 @@ impl Describe for GivenError {
     fn diagnostic(&self) -> Diagnostic {
         match self {
             Self::NoSegments => Diagnostic::error("path/no-segments", self).hint("give at least one segment of four points"),
-            Self::NotFinite { .. } => Diagnostic::error("path/not-finite", self),
+            Self::NotFinite { .. } => Diagnostic::error("path/not-finite", self).hint("write metres, map frame"),
             Self::Gap { .. } => Diagnostic::error("path/gap", self).hint("a segment starts at the last point of the one before"),
-            Self::NoLength { .. } => Diagnostic::error("path/no-length", self),
+            Self::NoLength { .. } => Diagnostic::error("path/no-length", self).hint("remove the segment"),
             Self::Cusp { .. } => Diagnostic::error("path/cusp", self)
                 .hint("move the control points apart, or split the segment there: between segments the robot spins on the spot"),
-            Self::TooFewRows { name, .. } => Diagnostic::error("path/too-few-rows", self).file(name.as_str()),
-            Self::MissingColumn { name, .. } => Diagnostic::error("path/missing-column", self)
+            Self::TooFewRows { name, .. } => Diagnostic::error("path/too-few-rows", self)
                 .file(name.as_str())
-                .hint("the header is x_m, y_m and, if joints move, joint.<name>.pos_rad or _m"),
+                .hint("below a header `x_m,y_m` write one row a point, in metres"),
+            Self::MissingColumn { at, .. } => Diagnostic::error("path/missing-column", self)
+                .at(at)
+                .hint("the header is x_m, y_m and, if joints move, joint.NAME.pos_rad or joint.NAME.pos_m"),
             Self::UnknownColumn { meant, at, .. } => {
                 let diagnostic = Diagnostic::error("path/unknown-column", self).at(at);
                 match meant {
                     Some(meant) => diagnostic.hint(format!("did you mean `{meant}`?")),
-                    None => diagnostic.hint("known are x_m, y_m and joint.<name>.pos_rad or _m for moving joints"),
+                    None => diagnostic.hint("known are x_m, y_m and, for joints that move, joint.NAME.pos_rad or joint.NAME.pos_m"),
                 }
             }
-            Self::DoubleColumn { at, .. } => Diagnostic::error("path/double-column", self).at(at),
-            Self::Ragged { at, .. } => Diagnostic::error("path/ragged", self).at(at),
-            Self::NotANumber { at, .. } => Diagnostic::error("path/not-a-number", self).at(at),
+            Self::DoubleColumn { at, .. } => {
+                Diagnostic::error("path/double-column", self).at(at).hint("keep one of the two columns")
+            }
+            Self::Ragged { at, .. } => Diagnostic::error("path/ragged", self)
+                .at(at)
+                .hint("a row has one cell for each column, separated by commas; decimals are written with a point"),
+            Self::NotANumber { column, at, .. } => Diagnostic::error("path/not-a-number", self)
+                .at(at)
+                .hint(if column.ends_with("rad") { "write a number in radians, such as 1.57" } else { "write a number in metres, such as 0.5" }),
             Self::FarAway { at, .. } => Diagnostic::error("path/far-away", self).at(at).hint("metres are expected"),
             Self::RepeatedPoint { at, .. } => {
                 Diagnostic::error("path/repeated-point", self).at(at).hint("leave one of the two rows out")

@@ -53,7 +53,8 @@ impl Table {
             let meant = |title: &String| nearest(title, ["x_m", "y_m"]) == Some(column);
             let told = header.texts.iter().zip(&columns).any(|(title, c)| *c == Column::Unknown && meant(title));
             if !columns.contains(&Column::Plane(index)) && !told {
-                errors.push(GivenError::MissingColumn { name: name.to_owned(), column });
+                let (found, at) = (header.texts.join(", "), header.at.clone());
+                errors.push(GivenError::MissingColumn { column, found, at });
             }
         }
         let mut rows: Vec<Row> = Vec::new();
@@ -65,12 +66,12 @@ impl Table {
                 continue;
             }
             let mut row = Row { line, at: at.clone(), point: [0.0; 2], joints: vec![None; robot.joints.len()] };
-            for ((text, column), title) in cells.texts.iter().zip(&columns).zip(&header.texts) {
+            for (k, ((text, column), title)) in cells.texts.iter().zip(&columns).zip(&header.texts).enumerate() {
                 match (text.parse::<f64>(), column) {
                     (_, Column::Unknown) => {}
                     (Ok(value), Column::Plane(d)) if value.abs() <= LARGE => row.point[*d] = value,
                     (Ok(value), Column::Plane(_)) if value.is_finite() => {
-                        let (column, at) = (title.clone(), at.clone());
+                        let (column, at) = (title.clone(), cells.cell(k));
                         errors.push(GivenError::FarAway { line, column, value, limit: LARGE, at });
                     }
                     (Ok(value), Column::Joint(j)) if value.is_finite() => row.joints[*j] = Some(value),
@@ -78,7 +79,7 @@ impl Table {
                         line,
                         column: title.clone(),
                         text: text.clone(),
-                        at: at.clone(),
+                        at: cells.cell(k),
                     }),
                 }
             }
@@ -137,8 +138,8 @@ fn read_header(header: &Cells, robot: &RobotModel, errors: &mut Vec<GivenError>)
     let mut known = vec![("x_m".to_owned(), Column::Plane(0)), ("y_m".to_owned(), Column::Plane(1))];
     known.extend(robot.joints.iter().enumerate().map(|(i, joint)| (joint_column(joint), Column::Joint(i))));
     let mut columns = Vec::new();
-    for title in &header.texts {
-        let (line, at) = (header.line, header.at.clone());
+    for (k, title) in header.texts.iter().enumerate() {
+        let (line, at) = (header.line, header.cell(k));
         match known.iter().find(|(name, _)| name == title) {
             Some((_, column)) if columns.contains(column) => {
                 errors.push(GivenError::DoubleColumn { line, column: title.clone(), at });
@@ -160,6 +161,22 @@ struct Cells {
     line: usize,
     at: Span,
     texts: Vec<String>,
+}
+
+impl Cells {
+    /// The place of cell `k`; of the row, where quotation marks hide it.
+    fn cell(&self, k: usize) -> Span {
+        let row = &self.at.source.text[self.at.range.clone()];
+        let mut at = self.at.range.start;
+        let found = row.split(',').enumerate().find_map(|(i, cell)| {
+            let start = at + (cell.len() - cell.trim_start_matches(['\u{feff}', ' ', '\t', '"']).len());
+            at += cell.len() + 1;
+            (i == k).then(|| start..start + self.texts[k].len())
+        });
+        let same =
+            |range: &std::ops::Range<usize>| self.at.source.text.get(range.clone()) == Some(self.texts[k].as_str());
+        found.filter(same).map_or_else(|| self.at.clone(), |range| Span::new(&self.at.source, range))
+    }
 }
 
 /// Lines of a text that hold cells, each with its place. `csv` reads the cells; it is given one line at a time because its own

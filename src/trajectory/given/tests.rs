@@ -114,23 +114,20 @@ fn faults_of_a_csv_file_are_all_named_with_their_lines() {
     let at = |text: &str| Some(text.to_owned());
     assert_eq!(codes(""), [("path/too-few-rows", None)]);
     assert_eq!(codes("x_m,y_m\n0,0\n"), [("path/too-few-rows", None)]);
-    assert_eq!(codes("x_m,yy\n0,0\n1,1\n"), [("path/unknown-column", at("x_m,yy")), ("path/missing-column", None)]);
-    assert_eq!(
-        codes("x_m,y_m,joint.blad.pos_rad\n0,0,0\n1,1,0"),
-        [("path/unknown-column", at("x_m,y_m,joint.blad.pos_rad"))]
-    );
-    assert_eq!(codes("x_m,y_m,x_m\n0,0,0\n1,1,0"), [("path/double-column", at("x_m,y_m,x_m"))]);
+    assert_eq!(codes("x_m,yy\n0,0\n1,1\n"), [("path/unknown-column", at("yy")), ("path/missing-column", at("x_m,yy"))]);
+    assert_eq!(codes("x_m,y_m,joint.blad.pos_rad\n0,0,0\n1,1,0"), [("path/unknown-column", at("joint.blad.pos_rad"))]);
+    assert_eq!(codes("x_m,y_m,x_m\n0,0,0\n1,1,0"), [("path/double-column", at("x_m"))]);
     assert_eq!(
         codes("x_m,y_m\n0,0\n1,nan\n2\n3,inf\n4,east\n"),
         [
-            ("path/not-a-number", at("1,nan")),
+            ("path/not-a-number", at("nan")),
             ("path/ragged", at("2")),
-            ("path/not-a-number", at("3,inf")),
-            ("path/not-a-number", at("4,east"))
+            ("path/not-a-number", at("inf")),
+            ("path/not-a-number", at("east"))
         ]
     );
     // Found by fuzzing: its length took seconds to find.
-    assert_eq!(codes("x_m,y_m\n0,0\n1e12,0.5\n2,0.4"), [("path/far-away", at("1e12,0.5"))]);
+    assert_eq!(codes("x_m,y_m\n0,0\n1e12,0.5\n2,0.4"), [("path/far-away", at("1e12"))]);
     assert_eq!(codes("x_m,y_m\n0,0\n1,1\n# same\n1,1\n2,2\n"), [("path/repeated-point", at("1,1"))]);
     assert_eq!(codes("x_m,y_m\n0,0\n1,0\n0,0\n"), [("path/turns-back", at("1,0"))]);
     assert_eq!(
