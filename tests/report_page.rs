@@ -91,9 +91,12 @@ fn a_report_opens_and_moves_when_asked_and_only_then() {
     assert!((time(&mut browser) - before - 0.1).abs() < 1e-6, "the keyboard moves it by a row");
 
     browser.click("#play", 0.5);
-    browser.wait(800);
-    let later = time(&mut browser);
-    assert!(later > before + 0.3, "{before} to {later}");
+    // A busy machine draws few frames a second.
+    let moved = (0..50).any(|_| {
+        browser.wait(400);
+        time(&mut browser) > before + 0.3
+    });
+    assert!(moved, "it does not play from {before} on");
     browser.click("#play", 0.5);
     let held = time(&mut browser);
     browser.wait(400);

@@ -134,7 +134,12 @@ fn rest(text: &str) -> String {
         None => text.to_owned(),
     };
     let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with("tolerance:")).collect();
-    cut(&cut(&lines.join("\n"), "wheel_radius_m: "), "track_width_m: ")
+    let text = cut(&cut(&lines.join("\n"), "wheel_radius_m: "), "track_width_m: ");
+    // A new key.
+    match text.split_once("wheel_difference: ") {
+        Some((head, tail)) => head.to_owned() + tail.split_once(", ").map_or("", |(_, rest)| rest),
+        None => text,
+    }
 }
 
 #[test]

@@ -85,7 +85,7 @@ fn folders_that_may_not_be_written_to_are_named_and_stay_as_they_are() {
     assert_eq!(stderr.matches("cannot create a folder in").count(), 5, "{stderr}");
     assert!(stderr.contains("choose a folder that can be written with `--out DIR`"), "{stderr}");
     // Who reads on must know that these are commands of before.
-    assert!(stderr.contains("cannot remove") && stderr.contains("out/x/commands.csv: Permission denied"), "{stderr}");
+    assert!(stderr.contains("cannot remove") && stderr.contains("out/x/commands.csv`: Permission denied"), "{stderr}");
     assert!(folders(&out) == before);
     assert_eq!(leftovers(&out), [""; 0]);
     // One mission's alone.
@@ -95,7 +95,7 @@ fn folders_that_may_not_be_written_to_are_named_and_stay_as_they_are() {
     let (code, stderr) = nobody.run(&sandbox, &["build", "-k", "-j", "2"]);
     let root = fs::metadata(&out).is_ok_and(|found| std::os::unix::fs::MetadataExt::uid(&found) == 0);
     if code == Some(2) {
-        assert!(stderr.contains("cannot replace") && stderr.contains("out/b: Permission denied"), "{stderr}");
+        assert!(stderr.contains("cannot replace") && stderr.contains("out/b`: Permission denied"), "{stderr}");
         assert!(folders(&out)["b"] == before["b"], "as it was");
     } else {
         assert!(!root, "another one's folder cannot be moved by somebody else: {stderr}");
