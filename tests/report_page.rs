@@ -45,6 +45,14 @@ fn decoded(text: &str) -> Vec<u8> {
     bytes.collect()
 }
 
+/// Whether something is so within some seconds: a busy machine draws few frames.
+fn soon(browser: &mut Browser, holds: impl Fn(&mut Browser) -> bool) -> bool {
+    (0..50).any(|_| {
+        browser.wait(400);
+        holds(browser)
+    })
+}
+
 /// Nothing went wrong in the page, and it asked for nothing but itself.
 fn in_order(browser: &Browser) {
     assert_eq!(browser.errors, [""; 0]);
@@ -91,12 +99,7 @@ fn a_report_opens_and_moves_when_asked_and_only_then() {
     assert!((time(&mut browser) - before - 0.1).abs() < 1e-6, "the keyboard moves it by a row");
 
     browser.click("#play", 0.5);
-    // A busy machine draws few frames a second.
-    let moved = (0..50).any(|_| {
-        browser.wait(400);
-        time(&mut browser) > before + 0.3
-    });
-    assert!(moved, "it does not play from {before} on");
+    assert!(soon(&mut browser, |b| time(b) > before + 0.3), "it does not play from {before} on");
     browser.click("#play", 0.5);
     let held = time(&mut browser);
     browser.wait(400);
@@ -110,7 +113,7 @@ fn a_report_opens_and_moves_when_asked_and_only_then() {
     let seen = browser.drawing();
     browser.run("document.getElementById('canvas').focus()");
     browser.key("ArrowLeft", 37);
-    assert!(seen != browser.drawing(), "keys turn the view");
+    assert!(soon(&mut browser, |b| seen != b.drawing()), "keys turn the view");
     keep(&mut browser, "report_light.png");
     in_order(&browser);
 }
