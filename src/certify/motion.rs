@@ -293,6 +293,7 @@ mod tests {
     #[test]
     fn the_acceleration_of_a_stretched_arm_that_turns_in_all_its_joints_is_its_bound() {
         let mut robot = with_joint(with_joint(bare_robot(), false), false);
+        robot.bodies[0].origin = Isometry3::translation(0.2, 0.0, 0.0);
         for (parent, joint, far) in [(0, 0, 0.3), (1, 1, 0.4)] {
             robot = with_body(robot, parent, Isometry3::translation(far, 0.0, 0.0), [0.0, 0.0, 1.0], (joint, 1.0, 0.0));
         }
@@ -301,7 +302,7 @@ mod tests {
         let held = Held { speed: 0.0, turn_rate: 0.7, rates: &[1.1, 1.3] };
         let bound = Kinematics::new(&robot).acceleration(0, held, &[0.0, 0.0]);
         // Towards each axis, at the rate at which what is behind it turns in all.
-        let expected = 0.7f64.powi(2) * 0.3 + 1.8f64.powi(2) * 0.4 + 3.1f64.powi(2) * 0.5;
+        let expected = 0.7f64.powi(2) * (0.2 + 0.3) + 1.8f64.powi(2) * 0.4 + 3.1f64.powi(2) * 0.5;
         assert!((bound - expected).abs() < 1e-12, "{bound} {expected}");
     }
 

@@ -201,6 +201,19 @@ fn what_is_written_is_judged_not_what_is_planned() {
 }
 
 #[test]
+fn lengths_beyond_what_can_be_judged_are_told() {
+    for length in [1e-6, 1.1e6] {
+        let (mut robot, mut table, task) = case();
+        (robot.track_width, table.track_width) = (length, length);
+        let certificate = certify(&table, &robot, None, &task);
+        let expected = format!("the track width {length} is not a length of time or space that can be judged");
+        assert_eq!(certificate.refusals[0].message, expected);
+        table.sampling_time = length;
+        assert!(certify(&table, &robot, None, &task).refusals[0].message.starts_with("the sampling time"));
+    }
+}
+
+#[test]
 fn one_row_shows_what_is_wrong_with_all() {
     let (robot, table, task) = case();
     type Change = fn(&mut crate::command::CommandRow);

@@ -392,9 +392,11 @@ fn along_a_corridor_only_what_leads_to_its_sides_counts_and_trust_ends_where_the
     assert!((refused.clearance_proven.expect("a map") - 0.3).abs() < 1e-3, "of the model itself");
     let trusted = trust(&table, &robot, Some(&map), &task, uneven).expect("rows");
     let until = trusted.until();
+    assert_eq!(trusted.end(), *trusted.tube.last().expect("rows"));
     let to_the_side = |x: f64| x * x / 160.0 + 0.2 * x / 80.0 - 0.3;
     assert!(to_the_side(until.length) < 0.0 && to_the_side(until.length + 0.2) > 0.0, "{}", until.length);
-    assert_eq!(trust(&table, &robot, Some(&map), &task, Tolerance::default()).expect("rows").contact, None);
+    let everywhere = trust(&table, &robot, Some(&map), &task, Tolerance::default()).expect("rows");
+    assert_eq!((everywhere.contact, everywhere.until()), (None, everywhere.end()));
 }
 
 #[test]
