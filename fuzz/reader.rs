@@ -1,6 +1,7 @@
 //! One reader of `tests/fuzz_inputs/readers.rs`, made once.
 
 #[path = "../tests/fuzz_inputs/readers.rs"]
+#[allow(dead_code)] // its valid files are written out by tests/fuzz_inputs.rs
 mod readers;
 
 use std::cell::OnceCell;

@@ -295,6 +295,35 @@ mod tests {
         }
     }
 
+    proptest! {
+        #[test]
+        fn with_a_spread_a_shape_reaches_as_far_as_any_of_its_points_can_be(
+            vertices in prop::collection::vec([-0.6..0.6, -0.6..0.6, -0.6..0.6f64], 5..20), pose in any_pose(),
+            along in [[-0.1..0.1, -0.1..0.1f64], [-0.1..0.1, -0.1..0.1f64], [-0.1..0.1, -0.1..0.1f64], [-0.1..0.1, -0.1..0.1f64]],
+            (turn, disc, ball) in (0.0..0.3f64, 0.0..0.1f64, 0.0..0.1f64), d in [-2.0..2.0, -2.0..2.0, -2.0..2.0f64],
+        ) {
+            let convex = Convex::Hull { vertices: vertices.clone() };
+            let spread = Spread { along: along.map(Vector2::from), turn, disc, ball };
+            let shape = Posed { spread: Some(spread), ..posed(&convex, &pose) };
+            let d = Vector3::from(d);
+            let farthest = vertices.iter().flat_map(|v| {
+                let p = shape.turn * Vector3::from(*v);
+                [-turn, turn].map(|angle| d.dot(&(p + Vector3::z().cross(&p) * angle)))
+            });
+            let shifts: f64 = along.iter().map(|v| (v[0] * d.x + v[1] * d.y).abs()).sum();
+            let expected = farthest.fold(f64::NEG_INFINITY, f64::max) + shifts + disc * d.x.hypot(d.y) + ball * d.norm();
+            prop_assert!((shape.reach(&d) - expected).abs() < 1e-12);
+            prop_assert!((d.dot(&shape.support(&d)) - expected).abs() < 1e-12, "the point there");
+        }
+
+        #[test]
+        fn how_far_a_shape_reaches_grows_with_the_vector(convex in any_convex(), pose in any_pose(), scale in 0.1..10.0f64) {
+            let (shape, d) = (posed(&convex, &pose), Vector3::new(0.3, -0.4, 0.5));
+            prop_assert!((shape.reach(&(d * scale)) - scale * shape.reach(&d)).abs() < 1e-12);
+            prop_assert!((d.dot(&shape.support(&d)) - shape.reach(&d)).abs() < 1e-12);
+        }
+    }
+
     #[test]
     fn the_depth_is_the_shortest_way_out() {
         let obstacle = Aabb { min: [0.0; 3], max: [1.0; 3] };

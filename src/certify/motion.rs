@@ -290,6 +290,103 @@ mod tests {
         assert!((bound - 0.7 * (0.3 + 0.7 * 0.9 + 2.0 * 2.2)).abs() < 1e-12, "{bound}");
     }
 
+    #[test]
+    fn the_acceleration_of_a_stretched_arm_that_turns_in_all_its_joints_is_its_bound() {
+        let mut robot = with_joint(with_joint(bare_robot(), false), false);
+        robot.bodies[0].origin = Isometry3::translation(0.2, 0.0, 0.0);
+        for (parent, joint, far) in [(0, 0, 0.3), (1, 1, 0.4)] {
+            robot = with_body(robot, parent, Isometry3::translation(far, 0.0, 0.0), [0.0, 0.0, 1.0], (joint, 1.0, 0.0));
+        }
+        let point = Convex::Hull { vertices: vec![[0.0; 3]] };
+        robot = with_shape(robot, 2, Isometry3::translation(0.5, 0.0, 0.0), point);
+        let held = Held { speed: 0.0, turn_rate: 0.7, rates: &[1.1, 1.3] };
+        let bound = Kinematics::new(&robot).acceleration(0, held, &[0.0, 0.0]);
+        // Towards each axis, at the rate at which what is behind it turns in all.
+        let expected = 0.7f64.powi(2) * (0.2 + 0.3) + 1.8f64.powi(2) * 0.4 + 3.1f64.powi(2) * 0.5;
+        assert!((bound - expected).abs() < 1e-12, "{bound} {expected}");
+    }
+
+    #[test]
+    fn levers_reach_to_the_farthest_corner_on_whichever_side_it_is() {
+        let brick = || Convex::Box { half: [0.2, 0.1, 0.05] };
+        let turning =
+            |rate| Held { speed: 0.0, turn_rate: 1.0 - rate, rates: if rate == 1.0 { &[1.0] } else { &[0.0] } };
+        for (x, y, z) in [(0.5, 0.3, 0.4), (-0.5, 0.3, 0.4), (0.5, -0.3, -0.4), (-0.5, -0.3, -0.4)] {
+            // About the base's vertical axis, and about an arm's own axis along x.
+            let base = with_shape(bare_robot(), 0, Isometry3::translation(x, y, z), brick());
+            let arm =
+                with_body(with_joint(bare_robot(), false), 0, Isometry3::identity(), [1.0, 0.0, 0.0], (0, 1.0, 0.0));
+            let arm = with_shape(arm, 1, Isometry3::translation(x, y, z), brick());
+            for (robot, rate, lever) in [(base, 0.0, 0.7f64.hypot(0.4)), (arm, 1.0, 0.4f64.hypot(0.45))] {
+                let bound = Kinematics::new(&robot).acceleration(0, turning(rate), &[0.0]);
+                assert!((bound - lever).abs() < 1e-12, "({x}, {y}, {z}): {bound} {lever}");
+            }
+        }
+        let hull = Convex::Hull { vertices: vec![[0.1, 0.0, 0.0], [-0.05, 0.0, 0.0]] };
+        let robot = with_shape(bare_robot(), 0, Isometry3::translation(0.5, 0.0, 0.2), hull);
+        let bound = Kinematics::new(&robot).acceleration(0, turning(0.0), &[]);
+        assert!((bound - 0.6).abs() < 1e-12, "{bound}");
+    }
+
+    #[test]
+    fn a_robot_is_as_large_as_its_links_in_a_row_with_what_slides_all_out() {
+        let arm = with_body(
+            with_joint(bare_robot(), true),
+            0,
+            Isometry3::translation(0.3, 0.4, 0.0),
+            [1.0, 0.0, 0.0],
+            (0, -2.0, 0.1),
+        );
+        let mut robot = with_shape(arm, 1, Isometry3::translation(0.0, 0.0, 0.6), Convex::Sphere { radius: 0.1 });
+        robot = with_shape(robot, 1, Isometry3::translation(0.0, 0.2, 0.0), Convex::Sphere { radius: 0.3 });
+        // 0.5 m to the slide, 2 x 0.4 + 0.1 m along it, 0.7 m to the end of the farther ball.
+        let size = Kinematics::new(&robot).size(&[0.4]);
+        assert!((size - 2.1).abs() < 1e-12, "{size}");
+    }
+
+    /// A ball whose middle is half a metre before the base, after a time so short that only speeds count.
+    #[test]
+    fn bounds_of_a_motion_are_hardly_more_than_what_moves_farthest() {
+        let ball = Convex::Sphere { radius: 0.1 };
+        let robot = with_shape(bare_robot(), 0, Isometry3::translation(0.5, 0.0, 0.2), ball);
+        let kinematics = Kinematics::new(&robot);
+        let shape = |speed: f64, turn_rate: f64| {
+            let held = Held { speed, turn_rate, rates: &[] };
+            let mut bodies = Vec::new();
+            kinematics.bodies(&[], held, &mut bodies);
+            kinematics.shape(0, &bodies, Pose2::default(), kinematics.acceleration(0, held, &[]))
+        };
+        let near =
+            |bound: f64, expected: f64| assert!((bound - expected).abs() < 1e-6 * expected, "{bound} {expected}");
+        let half = 1e-8;
+        for (speed, turn_rate, expected) in [(2.0, 0.0, 2.0), (0.0, 3.0, 3.0 * 0.6)] {
+            near(shape(speed, turn_rate).motion(half), half * expected);
+        }
+        let [backwards, forward] = shape(2.0, 0.0).reach(&Vector3::x(), half);
+        assert!((backwards, forward) == (0.1, 0.1 + 2.0 * half), "{backwards} {forward}");
+        let [before, after] = shape(0.0, 3.0).reach(&Vector3::y(), half);
+        near(before, 0.1);
+        near(after - 0.1, 3.0 * 0.5 * half);
+        assert_eq!(shape(2.0, 0.0).fastest(half), [2.0, 0.0]);
+        let [centre, against] = shape(0.0, 3.0).fastest(half);
+        near(centre, 1.5);
+        near(against, 0.3);
+        // Over a longer time, as much more as the corners of the box around the ball are accelerated.
+        let gained = 0.1 * 3.0f64.powi(2) * 0.6f64.hypot(0.1);
+        let [centre, against] = shape(0.0, 3.0).fastest(0.1);
+        near(centre, 1.5 + gained);
+        near(against, 0.3 + 2.0 * gained);
+        near(shape(0.0, 3.0).motion(0.1), 0.1 * (1.8 + 0.5 * gained));
+        // Points that may be off, and farther by 0.5 m/s.
+        let mut loose = shape(2.0, 0.0);
+        let nowhere = Spread { along: [nalgebra::Vector2::zeros(); 4], turn: 0.0, disc: 0.0, ball: 0.0 };
+        loose.loosen(nowhere, 0.5);
+        near(loose.motion(half), half * 2.5);
+        let [before, after] = loose.reach(&-Vector3::x(), half);
+        near(before - 0.1, half * 2.5);
+        assert_eq!(after, 0.1);
+    }
+
     proptest! {
         #[test]
         fn no_shape_reaches_farther_than_its_bound(

@@ -276,6 +276,21 @@ mod tests {
     }
 
     #[test]
+    fn a_cell_that_a_window_only_touches_is_found() {
+        let mut map = VoxelMap::new(0.1, [0.0; 3], [10, 10, 10], Unknown::Free);
+        map.occupy([5, 5, 5]);
+        for axis in 0..3 {
+            for [from, to] in [[0.2, 0.5], [0.6, 0.9]] {
+                let mut window = Aabb { min: [0.52; 3], max: [0.58; 3] };
+                (window.min[axis], window.max[axis]) = (from, to);
+                let mut boxes = Vec::new();
+                Obstacles::new(&map).near(&window, &mut boxes);
+                assert_eq!(boxes, [map.cube([5, 5, 5])], "{window:?}");
+            }
+        }
+    }
+
+    #[test]
     fn a_wall_becomes_one_box() {
         let mut map = VoxelMap::new(0.1, [0.0; 3], [40, 40, 10], Unknown::Free);
         for i in 10..12 {

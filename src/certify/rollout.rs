@@ -98,6 +98,7 @@ impl<'a> Rollout<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::certify::tests::robots::{bare_robot, commands};
     use crate::command::CommandRow;
     use crate::mission::Sampling;
 
@@ -128,5 +129,23 @@ mod tests {
         let mut extreme = Vec::new();
         rollout.extreme_joints(1, &mut extreme);
         assert!((extreme[0] - 0.2).abs() < 1e-15);
+    }
+
+    #[test]
+    fn rounding_far_away_is_no_more_than_its_bound_and_the_bound_is_small() {
+        let robot = bare_robot();
+        let held: Vec<_> = (0..2000).map(|k| (0.5, (0.37 * f64::from(k)).sin(), Vec::new())).collect();
+        let far = 8e5;
+        let near = commands(&robot, Pose2::new(0.0, 0.0, 0.3), &[], 0.1, &held).0;
+        let (origin, away) = (Pose2::new(0.0, 0.0, 0.3), Pose2::new(far, -far, 0.3));
+        let (here, there) = (Rollout::new(&near, origin, &[]), Rollout::new(&near, away, &[]));
+        let (small, bound) = (here.rounding(0.5, 0.0), there.rounding(0.5, 0.0));
+        assert!(bound < 1e-5 && small < 1e-8 && small > 100.0 * f64::EPSILON, "{small} {bound}");
+        let off = (0..there.rows()).map(|row| {
+            let (a, b) = (here.pose(row, 0.0), there.pose(row, 0.0));
+            (b.x - far - a.x).hypot(b.y + far - a.y)
+        });
+        let worst = off.fold(0.0, f64::max);
+        assert!(worst > 0.0 && worst <= bound, "{worst} {bound}");
     }
 }

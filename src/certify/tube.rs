@@ -318,3 +318,26 @@ fn farthest(along: &Drift) -> f64 {
     };
     (0..8).map(sum).fold(0.0, f64::max)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_lag_of_an_arc_is_its_integral_near_zero_too() {
+        for x in [1e-4, 3e-3, 0.009, 0.0099, 0.0101, 0.3, 1.0, 3.0, 7.5] {
+            // (cos x - sin(x)/x) / x = -integral of s sin(s x) over s from 0 to 1, here by Simpson's rule.
+            let steps = 20_000;
+            let weighed = (0..=steps).map(|k| {
+                let s = f64::from(k) / f64::from(steps);
+                let weight = if k == 0 || k == steps { 1.0 } else { 2.0 + 2.0 * f64::from(k % 2) };
+                weight * s * (s * x).sin()
+            });
+            let integral = -weighed.sum::<f64>() / (3.0 * f64::from(steps));
+            // The closed form loses digits where it is a difference of nearly equal numbers.
+            let rounding = if x < 1e-2 { 1e-13 * x } else { 1e-13 };
+            assert!((lag(x) - integral).abs() < rounding, "{x}: {} {integral}", lag(x));
+            assert_eq!(lag(-x), -lag(x));
+        }
+    }
+}

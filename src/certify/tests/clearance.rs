@@ -282,3 +282,23 @@ fn a_hull_whose_centre_lies_outside_it_is_measured_from_its_surface() {
     let closest = judge(&robot, &map, &stand, 0.0).closest.unwrap();
     assert!((closest.distance - 0.5 / 3f64.sqrt()).abs() < 1e-6, "{closest:?}");
 }
+
+/// 524 km from the origin a coordinate is known to some 1e-8 m: what that could hide is not proven, for cells and for edges. All lengths here
+/// are sums of powers of two, so the distance of half a metre is exact.
+#[test]
+fn what_rounding_could_hide_is_not_proven() {
+    let far = 524_288.0;
+    let robot = with_shape(bare_robot(), 0, Isometry3::translation(0.0, 0.0, 0.5), Convex::Box { half: [0.25; 3] });
+    let mut cells = VoxelMap::new(0.125, [far, far, 0.0], [64, 64, 8], Unknown::Free);
+    cells.occupy([38, 32, 4]);
+    let edges = VoxelMap::new(0.125, [far, far, 0.0], [64, 64, 8], Unknown::Occupied);
+    for (map, x) in [(&cells, 4.0), (&edges, 0.75)] {
+        for (required, holds) in [(0.5 - 1e-7, true), (0.5 - 4e-9, false)] {
+            let (table, mut task) = commands(&robot, Pose2::new(far + x, far + 4.0, 0.0), &[], 0.1, &[]);
+            task.clearance = required;
+            let certificate = certify(&table, &robot, Some(map), &task);
+            assert_eq!(certificate.holds(), holds, "{required}: {:?}", certificate.refusals);
+            assert!((certificate.closest.expect("near").distance - 0.5).abs() < 1e-7);
+        }
+    }
+}

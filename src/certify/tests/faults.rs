@@ -144,7 +144,7 @@ fn every_fault_of_a_table_is_refused() {
     let (robot, table, task) = case();
     let map = VoxelMap::new(0.1, [0.0; 3], [40, 40, 10], Unknown::Occupied);
     type Change = fn(&mut CommandTable, &mut Task);
-    let faults: [(&str, Change); 21] = [
+    let faults: [(&str, Change); 24] = [
         ("no rows", |t, _| t.rows.clear()),
         ("wheel not a number", |t, _| t.rows[1].wheel_left = f64::NAN),
         ("wheel infinite", |t, _| t.rows[1].wheel_right = f64::INFINITY),
@@ -153,6 +153,9 @@ fn every_fault_of_a_table_is_refused() {
         ("position not a number", |t, _| t.rows[2].joint_positions[0] = f64::NAN),
         ("speed not a number", |t, _| t.rows[2].joint_velocities[0] = f64::NAN),
         ("sampling time zero", |t, _| t.sampling_time = 0.0),
+        ("sampling time too short", |t, _| t.sampling_time = 1e-6),
+        ("sampling time too long", |t, _| t.sampling_time = 1.1e6),
+        ("row without speeds", |t, _| t.rows[1].joint_velocities.clear()),
         ("sampling time not a number", |t, _| t.sampling_time = f64::NAN),
         ("other wheels", |t, _| t.wheel_radii = 0.11.into()),
         ("a larger right wheel", |t, _| t.wheel_radii.difference = 1e-3),
@@ -196,4 +199,113 @@ fn what_is_written_is_judged_not_what_is_planned() {
     let (robot, mut table, task) = case();
     table.rows[2].pose.x += 0.5;
     assert!(certify(&table, &robot, None, &task).holds());
+}
+
+#[test]
+fn lengths_beyond_what_can_be_judged_are_told() {
+    for length in [1e-6, 1.1e6] {
+        let (mut robot, mut table, task) = case();
+        (robot.track_width, table.track_width) = (length, length);
+        let certificate = certify(&table, &robot, None, &task);
+        let expected = format!("the track width {length} is not a length of time or space that can be judged");
+        assert_eq!(certificate.refusals[0].message, expected);
+        table.sampling_time = length;
+        assert!(certify(&table, &robot, None, &task).refusals[0].message.starts_with("the sampling time"));
+    }
+}
+
+#[test]
+fn one_row_shows_what_is_wrong_with_all() {
+    let (robot, table, task) = case();
+    type Change = fn(&mut crate::command::CommandRow);
+    let faults: [(Change, usize); 3] = [
+        (|row| row.joint_positions.clear(), 1),
+        (|row| row.wheel_left = f64::NAN, 1),
+        (
+            |row| {
+                row.joint_positions.clear();
+                row.wheel_left = f64::NAN;
+            },
+            2,
+        ),
+    ];
+    for (change, messages) in faults {
+        let mut table = table.clone();
+        table.rows[1..].iter_mut().for_each(change);
+        let certificate = certify(&table, &robot, None, &task);
+        assert_eq!(certificate.refusals.len(), messages, "{:?}", certificate.refusals);
+        assert!(certificate.refusals.iter().all(|refusal| refusal.time == Some(0.1)));
+    }
+}
+
+#[test]
+fn refusals_say_by_how_much_and_when_first() {
+    let (mut robot, table, mut task) = case();
+    // Speeds of 0.1, 0.2 and 0.1: the change is as large in the first row as in the last.
+    robot.wheel.speed = Some(0.16);
+    robot.joints[0].limits.acceleration = Some(0.5);
+    let certificate = certify(&table, &robot, None, &task);
+    let said: Vec<_> = certificate.refusals.iter().map(|r| r.message.as_str()).collect();
+    assert_eq!(
+        said,
+        [
+            "`wheel_left`: speed 0.200000 m/s at t = 0.100 s, limit 0.160000 m/s (25.000 % over)",
+            "`wheel_right`: speed 0.200000 m/s at t = 0.100 s, limit 0.160000 m/s (25.000 % over)",
+            "`joint_0`: acceleration 1.000000 rad/s^2 at t = 0.000 s, limit 0.500000 rad/s^2 (100.000 % over)",
+        ]
+    );
+    robot.wheel.speed = None;
+    robot.joints[0].limits.acceleration = None;
+    task.goal.x += 0.5 * 0.5f64.cos();
+    task.goal.y += 0.5 * 0.5f64.sin();
+    task.goal.yaw = Some(0.5 - 2.0f64.to_radians());
+    task.goal.joints = vec![Some(0.34 + 3.0f64.to_radians())];
+    let certificate = certify(&table, &robot, None, &task);
+    let said: Vec<_> = certificate.refusals.iter().map(|r| r.message.as_str()).collect();
+    assert_eq!(
+        said,
+        [
+            "ends 500.000 mm from the goal (1 mm allowed)",
+            "ends 2.0000 degrees from the goal's heading (0.1 allowed)",
+            "ends 3.0000 degrees from the goal of `joint_0` (0.1 allowed)",
+        ]
+    );
+    robot.joints[0].prismatic = true;
+    let (mut table, task) = (table, task);
+    table.joints[0].1 = true;
+    let certificate = certify(&table, &robot, None, &task);
+    let wanted = 0.34 + 3.0f64.to_radians();
+    assert!(
+        certificate
+            .refusals
+            .iter()
+            .any(|r| r.message == format!("`joint_0` ends 52.360 mm from its goal {wanted:.4} m")),
+        "{:?}",
+        certificate.refusals
+    );
+}
+
+#[test]
+fn a_tolerance_is_not_blamed_for_what_the_model_itself_does_not_keep() {
+    let (mut robot, table, task) = case();
+    let mut map = VoxelMap::new(0.1, [0.0; 3], [40, 40, 10], Unknown::Free);
+    map.occupy([11, 20, 2]);
+    robot.tolerance = Some(crate::mission::Tolerance::ASSUMED);
+    let certificate = certify(&table, &robot, Some(&map), &task);
+    assert_eq!(kinds(&certificate), [RefusalKind::Clearance]);
+    robot.tolerance = None;
+    let alone = certify(&table, &robot, Some(&map), &task);
+    assert_eq!(certificate.clearance_proven, alone.clearance_proven);
+}
+
+#[test]
+fn the_clearance_alone_is_that_of_the_certificate() {
+    let (robot, mut table, task) = case();
+    let mut map = VoxelMap::new(0.1, [0.0; 3], [40, 40, 10], Unknown::Free);
+    map.occupy([15, 20, 2]);
+    let proven = crate::certify::clearance_proven(&table, &robot, &map, &task);
+    assert!(proven > 0.2, "{proven}");
+    assert_eq!(Some(proven), certify(&table, &robot, Some(&map), &task).clearance_proven);
+    table.rows.clear();
+    assert_eq!(crate::certify::clearance_proven(&table, &robot, &map, &task), 0.0);
 }

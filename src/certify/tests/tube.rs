@@ -131,6 +131,148 @@ proptest! {
     }
 }
 
+proptest! {
+    /// Each direction of the tube is the derivative of where the robot is by one deviation: by differences of replays, which know nothing
+    /// of the closed forms.
+    #[test]
+    fn the_directions_of_the_tube_are_derivatives_of_the_replay(
+        (start, _, step, held) in any_motion(), longer in 1.0..10.0f64,
+    ) {
+        let (robot, step) = (bare_robot(), step * longer);
+        let held: Vec<Twist> = held.into_iter().map(|(v, w, _)| (v, w, Vec::new())).collect();
+        let (table, _) = commands(&robot, start, &[], step, &held);
+        let rollout = Rollout::new(&table, start, &[]);
+        const SMALL: f64 = 1e-6;
+        let tolerance = Tolerance {
+            wheel_radius: SMALL, wheel_difference: SMALL, track: SMALL / (1.0 + SMALL), start_angle: SMALL, ..Tolerance::default()
+        };
+        let tube = Tube::new(&rollout, &robot, tolerance);
+        let replay = |deviation: usize, sign: f64| {
+            let mut own = table.clone();
+            let mut from = start;
+            match deviation {
+                0 => own.wheel_radii.mean *= 1.0 + sign * SMALL,
+                // The track is this much narrower: its inverse is what counts.
+                1 => own.track_width /= 1.0 + sign * SMALL,
+                2 => own.rows.iter_mut().for_each(|row| {
+                    row.wheel_left *= 1.0 - 0.5 * sign * SMALL;
+                    row.wheel_right *= 1.0 + 0.5 * sign * SMALL;
+                }),
+                _ => from.yaw += sign * SMALL,
+            }
+            own.replay(from)
+        };
+        for deviation in 0..4 {
+            let (less, more) = (replay(deviation, -1.0), replay(deviation, 1.0));
+            for row in 0..table.rows.len() {
+                let (drift, turning) = tube.parts(row);
+                let half = nalgebra::Vector2::new(more[row].x - less[row].x, more[row].y - less[row].y) * 0.5;
+                let turned = 0.5 * (more[row].yaw - less[row].yaw);
+                // Of third order in what is small, and rounding.
+                prop_assert!((drift[deviation] - half).norm() < 2e-12, "{deviation}: {} {half}", drift[deviation]);
+                prop_assert!((turning[deviation] - turned).abs() < 2e-12, "{deviation}: {} {turned}", turning[deviation]);
+            }
+        }
+    }
+}
+
+/// What is left of the deviations after the first order is what two of them make together, or one squared: cases in which one such term is
+/// nearly all of it.
+#[test]
+fn what_the_first_order_leaves_out_is_bounded_and_not_by_much_more_than_it_is() {
+    let robot = bare_robot();
+    let none = Tolerance::default();
+    let cases = [
+        ((1.0, 0.0), Tolerance { start_angle: 0.02, ..none }),
+        ((1.0, 0.0), Tolerance { start_angle: 0.01, wheel_radius: 0.1, ..none }),
+        ((0.0, 1.0), Tolerance { start_angle: 0.05, wheel_difference: 0.05, ..none }),
+        ((1.0, 0.0), Tolerance { wheel_difference: 1e-3, track: 0.4, ..none }),
+        ((1.0, 0.05), Tolerance { wheel_radius: 0.1, track: 0.2, ..none }),
+    ];
+    for ((speed, turn_rate), tolerance) in cases {
+        let (table, task) =
+            commands(&robot, Pose2::new(1.0, 2.0, 0.3), &[], 0.02, &vec![(speed, turn_rate, vec![]); 10]);
+        let rollout = Rollout::new(&table, task.start, &[]);
+        let tube = Tube::new(&rollout, &robot, tolerance);
+        // The farthest of all: every deviation at its end, the track narrow.
+        let off = Off { wheel_radius: 1.0, wheel_difference: 1.0, track: -1.0, apart: 0.0, start: [0.0, 0.0, 1.0] };
+        let (own, from) = off.table(&table, task.start, &tolerance);
+        let (last, model) = (own.replay(from)[10], table.replay(task.start)[10]);
+        let first_order: nalgebra::Vector2<f64> = tube.parts(10).0.iter().sum();
+        let left_out = (nalgebra::Vector2::new(last.x - model.x, last.y - model.y) - first_order).norm();
+        let bound = tube.anywhere(10);
+        assert!(left_out <= bound && bound <= 1.1 * left_out + 2e-9, "{tolerance:?}: {left_out} {bound}");
+        // The heading's bound is what such a robot does.
+        assert!((tube.width(10, 0.0).angle - (last.yaw - model.yaw)).abs() < 1e-12, "{tolerance:?}");
+    }
+}
+
+/// In so short a time that speeds count and nothing else does, what one tolerance alone adds to where a box before the base reaches.
+#[test]
+fn the_tube_over_an_interval_holds_that_of_its_ends_and_is_not_much_wider() {
+    let shape = Convex::Box { half: [0.2, 0.1, 0.1] };
+    let robot = with_shape(bare_robot(), 0, Isometry3::translation(0.5, 0.0, 0.2), shape);
+    let (none, forward, aside) = (Tolerance::default(), Vector3::x(), Vector3::y());
+    let (straight, spin, half) = ((1.0, 0.0), (0.0, 1.0), 1e-3);
+    // What is told beside: how much wider it may be at most, as its parts are bounded by circles.
+    let cases = [
+        (straight, Tolerance { wheel_radius: 0.1, ..none }, forward, 1.001),
+        (spin, Tolerance { wheel_radius: 0.1, ..none }, aside, 1.1),
+        (spin, Tolerance { track: 0.1, ..none }, aside, 1.1),
+        (straight, Tolerance { wheel_difference: 0.1, ..none }, aside, 1.1),
+        (straight, Tolerance { wheel_difference: 0.1, track: 0.4, ..none }, aside, 1.1),
+        (spin, Tolerance { wheel_difference: 0.1, ..none }, forward, 1.01),
+        (straight, Tolerance { start_angle: 0.4, ..none }, aside, 1.4),
+        (straight, Tolerance { start_angle: 0.4, wheel_radius: 0.2, ..none }, aside, 1.7),
+        (spin, Tolerance { start_angle: 0.01, ..none }, -forward, 2.6),
+    ];
+    for ((speed, turn_rate), tolerance, normal, most) in cases {
+        let (table, task) = commands(&robot, Pose2::default(), &[], 2.0 * half, &[(speed, turn_rate, vec![])]);
+        let rollout = Rollout::new(&table, task.start, &[]);
+        let tube = Tube::new(&rollout, &robot, tolerance);
+        let kinematics = Kinematics::new(&robot);
+        let held = rollout.held(0);
+        let acceleration = kinematics.acceleration(0, held, &[]);
+        // How far it reaches now, and how far at most up to `half` seconds later; in the tube, or the model's own.
+        let reaches = |tau: f64, half: f64, in_tube: bool| {
+            let mut bodies = Vec::new();
+            kinematics.bodies(&[], held, &mut bodies);
+            let mut moving = kinematics.shape(0, &bodies, rollout.pose(0, tau), acceleration);
+            if in_tube {
+                tube.loosen(0, &mut moving, (0, tau), half);
+            }
+            let at = normal.dot(&moving.posed.centre);
+            [at + moving.posed.reach(&normal), at + moving.reach(&normal, half)[1]]
+        };
+        let [[now, _], [_, bound], [then, _]] =
+            [(half, 0.0), (half, half), (2.0 * half, 0.0)].map(|(tau, half)| reaches(tau, half, true));
+        assert!(then <= bound + 1e-13, "{tolerance:?}: {then} above {bound}");
+        let ([own_now, own_bound], [own_then, _]) = (reaches(half, half, false), reaches(2.0 * half, 0.0, false));
+        let (added, bounded) = ((then - now) - (own_then - own_now), (bound - now) - (own_bound - own_now));
+        assert!(added > 1e-6 && bounded <= most * added + 1e-9, "{tolerance:?}: {bounded} for {added}");
+    }
+}
+
+/// Rates 0, 0, 1, 0, 0, 0 rad/s of an arm of half a metre; late by at most a row and a half.
+#[test]
+fn joints_are_late_where_they_move_within_the_latency() {
+    let mut robot = with_joint(bare_robot(), false);
+    robot = with_body(robot, 0, Isometry3::identity(), [0.0, 0.0, 1.0], (0, 2.0, 0.0));
+    robot = with_shape(robot, 1, Isometry3::translation(0.4, 0.0, 0.2), Convex::Sphere { radius: 0.1 });
+    let held: Vec<Twist> = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0].map(|rate| (0.0, 0.0, vec![rate])).into();
+    let (table, task) = commands(&robot, Pose2::default(), &[0.0], 0.1, &held);
+    let rollout = Rollout::new(&table, task.start, &[0.0]);
+    let tube = Tube::new(&rollout, &robot, Tolerance { latency: 0.15, ..Tolerance::default() });
+    // The point that is farthest from the axis moves 0.5 m/rad, the body 2 rad for each of the joint's.
+    let late: Vec<f64> = (0..table.rows.len()).map(|row| tube.late(row)).collect();
+    assert!(late[..5].iter().all(|late| (late - 0.15 * 2.0 * 0.5).abs() < 1e-8), "{late:?}");
+    assert_eq!(late[5..], [0.0, 0.0]);
+    let at = |row: usize| {
+        tube.shares((row, 0.05), 0, nalgebra::Vector2::new(0.5, 0.0), nalgebra::Vector2::new(0.0, 1.0)).latency
+    };
+    assert_eq!([at(0), at(5)], [late[0], 0.0]);
+}
+
 /// 9 m of all kinds: straight, a spin there and a spin back, bends both ways, backwards; and where it starts.
 fn nine_metres(robot: &RobotModel) -> (CommandTable, Task) {
     let stretches = [
@@ -250,9 +392,11 @@ fn along_a_corridor_only_what_leads_to_its_sides_counts_and_trust_ends_where_the
     assert!((refused.clearance_proven.expect("a map") - 0.3).abs() < 1e-3, "of the model itself");
     let trusted = trust(&table, &robot, Some(&map), &task, uneven).expect("rows");
     let until = trusted.until();
+    assert_eq!(trusted.end(), *trusted.tube.last().expect("rows"));
     let to_the_side = |x: f64| x * x / 160.0 + 0.2 * x / 80.0 - 0.3;
     assert!(to_the_side(until.length) < 0.0 && to_the_side(until.length + 0.2) > 0.0, "{}", until.length);
-    assert_eq!(trust(&table, &robot, Some(&map), &task, Tolerance::default()).expect("rows").contact, None);
+    let everywhere = trust(&table, &robot, Some(&map), &task, Tolerance::default()).expect("rows");
+    assert_eq!((everywhere.contact, everywhere.until()), (None, everywhere.end()));
 }
 
 #[test]

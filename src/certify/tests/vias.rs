@@ -15,10 +15,14 @@ fn judged(vias: &[Via]) -> Certificate {
 }
 
 fn motion() -> (RobotModel, CommandTable, Task) {
+    motion_from(Pose2::default())
+}
+
+fn motion_from(start: Pose2) -> (RobotModel, CommandTable, Task) {
     let robot = with_body(with_joint(bare_robot(), false), 0, Isometry3::identity(), [0.0, 1.0, 0.0], (0, 1.0, 0.0));
     let drive = |rate: f64| std::iter::repeat_n((0.1, 0.0, vec![rate]), 10);
     let held: Vec<_> = drive(0.5).chain(std::iter::repeat_n((0.0, 0.0, vec![0.0]), 3)).chain(drive(0.0)).collect();
-    let (table, task) = commands(&robot, Pose2::default(), &[0.0], 0.1, &held);
+    let (table, task) = commands(&robot, start, &[0.0], 0.1, &held);
     (robot, table, task)
 }
 
@@ -62,7 +66,8 @@ fn a_stop_lasts_as_long_as_is_asked() {
 #[test]
 fn stops_come_in_their_order_and_each_moment_counts_once() {
     near(times(&[via(0.1, 0.0), via(0.2, 0.0)]), &[1.0, 2.3]);
-    assert!(times(&[via(0.2, 0.0), via(0.1, 0.0)]).expect_err("backwards").contains("via[1]"));
+    let backwards = times(&[via(0.2, 0.0), via(0.1, 0.0)]).expect_err("backwards");
+    assert!(backwards.contains("via[1]") && backwards.ends_with("it does not stop any more"), "{backwards}");
     near(times(&[via(0.1, 0.1), via(0.1, 0.2)]), &[1.0, 1.1]);
     assert!(times(&[via(0.1, 0.2), via(0.1, 0.2)]).expect_err("0.3 s in all").contains("via[1]"));
 }
@@ -95,4 +100,25 @@ fn a_goal_or_via_with_a_radius_is_the_disc_and_nothing_more() {
         assert!((certificate.end_point_error - 0.05).abs() < 1e-12);
         assert_eq!(certificate.refusals.iter().any(|r| r.message.contains("50.000 mm from the goal")), !good);
     }
+}
+
+#[test]
+fn anywhere_on_the_floor_a_stop_is_judged_by_its_distance_and_angle() {
+    let start = Pose2::new(3.0, -2.0, 2.0);
+    let (robot, table, task) = motion_from(start);
+    let stop = start.after_twist(0.1, 0.0, 1.0);
+    let judged = |off: [f64; 2], turn: f64, dwell: f64| {
+        let yaw = Some(stop.yaw + turn + std::f64::consts::TAU);
+        let place = Goal { x: stop.x + off[0], y: stop.y + off[1], within: 0.0, yaw, joints: vec![Some(0.5)] };
+        certify_through(&table, &robot, None, &task, Demands { vias: &[Via { place, dwell }], zones: &[] })
+    };
+    let certificate = judged([3e-4, -4e-4], 1e-3, 0.3);
+    assert!(certificate.holds(), "{:?}", certificate.refusals);
+    let reached = certificate.vias[0];
+    assert!((reached.point_error - 5e-4).abs() < 1e-12 && (reached.time - 1.0).abs() < 1e-9, "{reached:?}");
+    assert!((reached.heading_error.expect("asked for") - 1e-3).abs() < 1e-12, "{reached:?}");
+    let said = |off: [f64; 2], turn: f64| judged(off, turn, 0.0).refusals[0].message.clone();
+    assert!(said([0.0, 0.04], 0.0).contains("its nearest stop after that is 40.000 mm away"));
+    assert!(said([0.04, 0.0], 0.0).contains("its nearest stop after that is 40.000 mm away"));
+    assert!(said([0.0, 0.0], 0.1).contains("with another heading or other joints"));
 }

@@ -28,6 +28,20 @@ fn a_zone_between_two_rows_is_seen() {
         }
     }
     assert_eq!(judged(&held, &strip(0.3), 0.9).zones[0].peak, None, "it ends before that");
+    // Nearer than a tenth of a millimetre counts as in it.
+    for (x, peak) in [(0.20005, 1.0), (0.20015, 0.5), (0.1 - 1.05e-3, 1.0), (0.1 - 1.15e-3, 0.5)] {
+        assert_eq!(judged(&held, &strip(x), 0.9).zones[0].peak, Some(peak), "{x}");
+    }
+    // So far from the origin a coordinate is known to some 1e-8 m only, so as much counts as in it besides.
+    let far = |x: f64| [[x, -9e5], [x + 1e-3, -9e5], [x + 1e-3, 9e5], [x, 9e5]];
+    assert_eq!(judged(&held, &far(0.2 + 1e-4 + 1.5e-8), 0.9).zones[0].peak, Some(1.0));
+}
+
+#[test]
+fn a_zone_that_is_passed_closely_is_not_entered() {
+    // 2 cm beside the middle of a row that is 10 cm long.
+    let beside = [[0.14, 0.02], [0.16, 0.02], [0.16, 0.1], [0.14, 0.1]];
+    assert_eq!(judged(&[(0.5, 0.0), (0.5, 0.0), (1.0, 0.0)], &beside, 0.1).zones[0].peak, None);
 }
 
 #[test]
