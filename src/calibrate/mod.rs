@@ -89,6 +89,13 @@ impl Fit {
         (self.geometry[1] - self.geometry[0]) / self.radius()
     }
 
+    /// The share to reckon with from here on: what was found, unless the log does not tell it from none. An error of it bends every straight line, and
+    /// most robots' wheels are alike.
+    pub fn larger_right(&self) -> f64 {
+        let [_, deviation, _] = self.deviations();
+        if self.difference().abs() > 3.0 * deviation { self.difference() } else { 0.0 }
+    }
+
     /// Standard deviations of mean radius, difference (share) and track: m, 1, m.
     pub fn deviations(&self) -> [f64; 3] {
         let c = &self.covariance;
@@ -105,7 +112,7 @@ impl Fit {
         let [radius, difference, track] = self.deviations();
         Remaining {
             wheel_radius: 3.0 * radius / self.radius(),
-            wheel_difference: 3.0 * difference,
+            wheel_difference: 3.0 * difference + (self.difference() - self.larger_right()).abs(),
             track: 3.0 * track / self.geometry[2],
         }
     }

@@ -28,10 +28,14 @@ pub fn rewrite(name: &str, text: &str, fit: &Fit) -> Result<String, RewriteError
         let places = (1.0 - deviation.max(1e-9).log10()).ceil().clamp(3.0, 9.0) as usize;
         format!("{value:.places$}")
     };
+    let larger = match fit.larger_right() {
+        0.0 => "0%".to_owned(),
+        share => format!("{}%", decimal(100.0 * share, 100.0 * difference)),
+    };
     let values = [
         // New keys go before those that are there: the last one comes first.
         ("drive", "track_width_m", decimal(fit.geometry[2], track)),
-        ("drive", "wheel_difference", format!("{}%", decimal(100.0 * fit.difference(), 100.0 * difference))),
+        ("drive", "wheel_difference", larger),
         ("drive", "wheel_radius_m", decimal(fit.radius(), radius)),
         ("tolerance", "track", percent(remaining.track)),
         ("tolerance", "wheel_difference", percent(remaining.wheel_difference)),

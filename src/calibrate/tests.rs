@@ -111,7 +111,14 @@ fn the_remaining_tolerance_is_three_deviations_and_holds_what_is_true() {
     let fit = fit(&log(&rich(), PoseNoise::default(), 0.0, 5), GUESS, PoseNoise::default()).expect("a fit");
     let remaining = fit.remaining();
     let difference = (TRUE[1] - TRUE[0]) / (0.5 * (TRUE[0] + TRUE[1]));
-    assert!((fit.difference() - difference).abs() < remaining.wheel_difference && remaining.wheel_difference < 0.01);
+    assert!((fit.larger_right() - difference).abs() < remaining.wheel_difference && remaining.wheel_difference < 0.01);
+    // A log that does not tell a difference from none has it in what remains.
+    let mut alike = fit.clone();
+    alike.geometry[1] = alike.geometry[0] * (1.0 + 0.1 * remaining.wheel_difference);
+    assert_eq!(alike.larger_right(), 0.0);
+    assert!(alike.remaining().wheel_difference > remaining.wheel_difference);
+    alike.geometry[1] = 1.1 * alike.geometry[0];
+    assert_eq!(alike.larger_right(), alike.difference());
     assert!(remaining.track < 0.01 && remaining.wheel_radius < 0.005, "{remaining:?}");
 }
 

@@ -138,7 +138,7 @@ fn readable(fit: &Fit, guess: [f64; 3]) -> String {
     let change = |new: f64, old: f64| 100.0 * (new / old - 1.0);
     let r = fit.remaining();
     format!(
-        "wheel radius   {:.6} m ± {:.6} ({:+.3} %); left {:.6} m, right {:.6} m\nright wheel    {:+.3} % larger than the left one ± {:.3}\n\
+        "wheel radius   {:.6} m ± {:.6} ({:+.3} %); left {:.6} m, right {:.6} m\nright wheel    {:+.3} % larger than the left one ± {:.3}{}\n\
          track width    {:.5} m ± {:.5} ({:+.3} %)\nfrom           {} pairs of poses, {} of them outliers; residuals {:.2} of the noise\n\
          remaining      wheel_radius {:.3} %, wheel_difference {:.3} %, track {:.3} % (3 sigma)\n",
         fit.radius(),
@@ -148,6 +148,7 @@ fn readable(fit: &Fit, guess: [f64; 3]) -> String {
         fit.geometry[1],
         100.0 * fit.difference(),
         100.0 * difference,
+        if fit.larger_right() == 0.0 { ": taken for none" } else { "" },
         fit.geometry[2],
         track,
         change(fit.geometry[2], guess[2]),
@@ -165,7 +166,7 @@ fn json(fit: &Fit, guess: [f64; 3]) -> String {
     let remaining = fit.remaining();
     let value = serde_json::json!({
         "wheel_radius_m": {"left": fit.geometry[0], "right": fit.geometry[1], "mean": fit.radius(), "sigma": radius, "before": guess[0]},
-        "wheel_difference": {"share": fit.difference(), "sigma": difference},
+        "wheel_difference": {"share": fit.difference(), "sigma": difference, "written": fit.larger_right()},
         "track_width_m": {"value": fit.geometry[2], "sigma": track, "before": guess[2]},
         "covariance_m2": {"order": ["left", "right", "track"], "rows": fit.covariance},
         "pairs": fit.pairs,
