@@ -6,7 +6,7 @@ use trajc::command::{CommandRow, CommandTable};
 use trajc::geom::Pose2;
 use trajc::inputs;
 use trajc::map::VoxelMap;
-use trajc::mission::Tolerance;
+use trajc::mission::{Tolerance, ToleranceSpec};
 use trajc::pipeline::{self, CompileOptions};
 use trajc::robot::RobotModel;
 
@@ -20,12 +20,18 @@ struct Compiled {
 }
 
 fn compiled(mission: &str) -> Compiled {
+    compiled_within(mission, None).expect("certified")
+}
+
+/// With another tolerance; `None` where it is not certified.
+fn compiled_within(mission: &str, tolerance: Option<ToleranceSpec>) -> Option<Compiled> {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("missions/{mission}.yaml"));
     let (mut inputs, _) = inputs::read(&path).expect("shipped");
     inputs.mission.path_error_times.clear();
+    inputs.mission.tolerance = tolerance.or(inputs.mission.tolerance);
     let map = VoxelMap::clone(&pipeline::world(&mut inputs).expect("shipped").map.expect("has a map"));
     let outcome = pipeline::compile(&mut inputs, &CompileOptions::default(), &mut |_| {});
-    let done = outcome.compiled.expect("certified");
+    let done = outcome.compiled?;
     let (first, last) = (&done.commands.rows[0], &done.commands.rows[done.commands.rows.len() - 1]);
     let goal = certify::Goal {
         x: last.pose.x,
@@ -42,7 +48,7 @@ fn compiled(mission: &str) -> Compiled {
         reverse: inputs.mission.reverse,
     };
     let proven = done.certificate.tolerance.as_ref().and_then(|inside| inside.clearance_proven);
-    Compiled { robot: done.robot, map, table: done.commands, task, proven }
+    Some(Compiled { robot: done.robot, map, table: done.commands, task, proven })
 }
 
 /// A number from -1 to 1 by a generator with a fixed seed; some of them at the ends.
@@ -134,25 +140,69 @@ fn late(table: &CommandTable, joints: usize, wheels: usize) -> CommandTable {
     CommandTable { sampling_time: table.sampling_time / PARTS as f64, rows: rows.collect(), ..table.clone() }
 }
 
+/// Clearance that is proven of every robot within the tolerance in force, and the least of two hundred random ones of them, m.
+fn proven_and_nearest(Compiled { robot, map, table, task, proven }: &Compiled) -> (f64, f64) {
+    let proven = proven.expect("a tolerance and a map");
+    let tolerance = robot.tolerance.expect("in force");
+    assert!(proven >= task.clearance);
+    assert!((tolerance.latency - table.sampling_time / 5.0).abs() < 1e-12, "one of the rows that `late` makes");
+    let mut least = f64::INFINITY;
+    let mut state = 7;
+    for index in 0..200 {
+        let shares = std::array::from_fn(|_| share(&mut state));
+        let (own, from) = another(table, task.start, &tolerance, shares);
+        let own = late(&own, index % 2, index / 2 % 2);
+        for instant in certify::distances(&own, robot, map, (from, &task.start_joints), 3, 0.3) {
+            least = least.min(instant.distance);
+        }
+    }
+    (proven, least)
+}
+
 #[test]
 fn of_two_hundred_random_robots_within_a_certified_tolerance_none_comes_nearer_than_proven() {
     for mission in ["site_tolerance", "barn_29_tolerance"] {
-        let Compiled { robot, map, table, task, proven } = compiled(mission);
-        let proven = proven.expect("a tolerance and a map");
-        let tolerance = robot.tolerance.expect("in force");
-        assert!(proven >= task.clearance);
-        assert!((tolerance.latency - table.sampling_time / 5.0).abs() < 1e-12, "one of the rows that `late` makes");
-        let mut least = f64::INFINITY;
-        let mut state = 7;
-        for index in 0..200 {
-            let shares = std::array::from_fn(|_| share(&mut state));
-            let (own, from) = another(&table, task.start, &tolerance, shares);
-            let own = late(&own, index % 2, index / 2 % 2);
-            for instant in certify::distances(&own, &robot, &map, (from, &task.start_joints), 3, 0.3) {
-                least = least.min(instant.distance);
-            }
-        }
+        let (proven, least) = proven_and_nearest(&compiled(mission));
         println!("{mission}: proven {proven:.4} m, nearest {least:.4} m");
         assert!(least >= proven, "{mission}: {least} m, {proven} m proven");
     }
+}
+
+#[test]
+#[ignore = "minutes: compiles each shipped mission several times; cargo test --release --test tolerance -- --ignored --nocapture"]
+fn nor_on_any_shipped_mission_with_the_largest_part_of_the_usual_tolerance_that_it_is_certified_with() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("missions");
+    let mut names: Vec<String> = std::fs::read_dir(folder)
+        .expect("shipped")
+        .map(|entry| entry.expect("an entry").path())
+        .filter(|path| std::fs::read_to_string(path).is_ok_and(|text| text.lines().any(|l| l.starts_with("map:"))))
+        .map(|path| path.file_stem().expect("a name").to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    let mut tried = 0;
+    for mission in names {
+        let usual = Tolerance::ASSUMED;
+        let hold = compiled(&mission).table.sampling_time;
+        let found = (0..8).find_map(|halved| {
+            let part = 0.5f64.powi(halved);
+            let spec = ToleranceSpec {
+                wheel_radius: Some(part * usual.wheel_radius),
+                wheel_difference: Some(part * usual.wheel_difference),
+                track: Some(part * usual.track),
+                latency: Some(hold / 5.0),
+                start_distance: Some(part * usual.start_distance),
+                start_angle: Some(part * usual.start_angle),
+            };
+            compiled_within(&mission, Some(spec)).map(|done| (part, done))
+        });
+        let Some((part, done)) = found else {
+            println!("{mission}: not certified with a hundredth of it");
+            continue;
+        };
+        let (proven, least) = proven_and_nearest(&done);
+        println!("{mission}: {part} of it; proven {proven:.4} m, nearest {least:.4} m");
+        assert!(least >= proven, "{mission}: {least} m, {proven} m proven");
+        tried += 1;
+    }
+    assert!(tried > 10);
 }
