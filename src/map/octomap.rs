@@ -3,7 +3,7 @@
 //! An own reader: no crate reads these. The tree is walked twice, once to check it and to find its bounds, once to mark cells, so
 //! that nothing is held but the file and the grid. Cell c of the tree spans `c * resolution` to `(c + 1) * resolution`.
 
-use super::error::MapError;
+use super::error::{MapError, room};
 use super::header::Header;
 use super::points::quote;
 use super::voxelize::{self, Slab};
@@ -285,7 +285,12 @@ impl Octree<'_> {
             let cube = map.cube(cell);
             [0, 1, 2].map(|a| 0.5 * (cube.min[a] + cube.max[a]))
         };
-        Ok(map.cells().map(centre).collect())
+        // One large leaf is a bit a cell in the grid, and two hundred times as much here.
+        let count = map.occupied_count();
+        room("the centres of the occupied cells", count as u128 * size_of::<[f64; 3]>() as u128)?;
+        let mut centres = Vec::with_capacity(count);
+        centres.extend(map.cells().map(centre));
+        Ok(centres)
     }
 
     /// Cells of the tree's own size. The grid is the box around all leaves, cut to the slab.

@@ -110,10 +110,13 @@ pub fn octomap() -> Vec<Vec<u8>> {
         format!("# Octomap OcTree{kind} file\nid {id}\nsize {size}\nres 0.1\ndata\n")
     };
     let record = |odds: f32, children: u8| [&odds.to_le_bytes()[..], &[children]].concat();
+    // Large leaves, more than 2^21 cells in all: a list of them is larger than their grid.
+    let large = [[3, 0].repeat(8), vec![3, 0x90, 0x1c, 0, 3, 0, 3, 0, 0x69, 0x59]].concat();
     let mut records = record(0.5, 0b11);
     records.extend([record(0.8, 0b1000_0001), record(-0.4, 0), record(0.9, 0), record(-1.0, 0)].concat());
     vec![
         [header(" binary", "OcTree", 1 + 15 + 8).into_bytes(), bits].concat(),
+        [header(" binary", "OcTree", 1 + 15 + 8).into_bytes(), large].concat(),
         [header("", "OcTree", 5).into_bytes(), records].concat(),
     ]
 }
