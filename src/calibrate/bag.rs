@@ -7,14 +7,11 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use super::Log;
 use crate::emit::cdr::{CdrError, Reader};
 use crate::emit::mcap_read::{McapReadError, Recording};
-use crate::geom::Pose2;
-use crate::robot::{DriveJoint, RobotModel};
+use crate::robot::{BASE_FRAMES, DriveJoint, RobotModel};
 
 /// Topics with poses that are looked for, and the static transforms that belong to the second.
 const POSES: [&str; 2] = ["/odom", "/tf"];
 const STATIC: &str = "/tf_static";
-/// Frames that are the base where the URDF's root link is in no transform.
-const BASES: [&str; 2] = ["base_footprint", "base_link"];
 
 /// Where a bag has what.
 #[derive(Debug, Clone, Copy)]
@@ -133,12 +130,7 @@ pub fn read_mcap(
         "tf2_msgs/msg/TFMessage" => transformed(&bag, topic, model, topics.base_frame)?,
         _ => return Err(BagError::Kind { topic: topic.to_owned(), kind: kind.clone() }),
     };
-    let poses = poses.into_iter().map(|(at, (frame, pose))| {
-        // Poses of the root link are turned into those of the base; a frame of any other name is taken for the base.
-        let pose = if frame == model.root_link { pose * model.base_from_root.inverse() } else { pose };
-        let forward = pose.rotation * nalgebra::Vector3::x();
-        (at, Pose2::new(pose.translation.x, pose.translation.y, forward.y.atan2(forward.x)))
-    });
+    let poses = poses.into_iter().map(|(at, (frame, pose))| (at, model.base_of(&frame, pose)));
     let origin = wheels.iter().map(|(at, _)| *at).min().unwrap_or_default();
     Ok(Log { wheels: in_order(wheels, origin), poses: in_order(poses.collect(), origin) })
 }
@@ -270,7 +262,7 @@ fn transformed(
     let wanted = base_frame.unwrap_or(&model.root_link);
     let base = match base_frame {
         Some(frame) => Some(frame).filter(known),
-        None => [wanted].into_iter().chain(BASES).find(known),
+        None => [wanted].into_iter().chain(BASE_FRAMES).find(known),
     };
     let base = base.ok_or_else(|| no_frame(wanted))?;
     // From the base up, no farther than there are transforms: they may go round.

@@ -108,12 +108,6 @@ impl Diagnostic {
         self
     }
 
-    /// Adds what to do, where nothing better was said.
-    pub fn or_hint(mut self, hint: impl Into<String>) -> Self {
-        self.hint.get_or_insert_with(|| hint.into());
-        self
-    }
-
     /// Adds a number for `report.json`.
     pub fn number(mut self, key: &'static str, value: impl Into<serde_json::Value>) -> Self {
         self.numbers.push((key, value.into()));

@@ -35,13 +35,12 @@ pub(super) fn head(table: &CommandTable, header: &CsvHeader) -> Vec<(&'static st
     let mut head =
         vec![("format", FORMAT.to_string()), ("mission", plain(&header.mission)), ("robot", plain(&header.robot))];
     head.extend(header.map.as_ref().map(|map| ("map", plain(map))));
-    let difference = table.wheel_radii.difference;
     head.extend([
         ("sampling_time_s", number(table.sampling_time)),
         ("sampling", names::sampling(table.sampling).to_string()),
         ("wheel_radius_m", number(table.wheel_radii.mean)),
     ]);
-    head.extend((difference != 0.0).then(|| ("wheel_difference", number(difference))));
+    head.extend(table.wheel_radii.unlike().map(|share| ("wheel_difference", number(share))));
     head.extend([("track_width_m", number(table.track_width)), ("inputs_blake3", plain(&header.inputs_blake3))]);
     head
 }

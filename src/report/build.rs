@@ -137,7 +137,7 @@ impl From<&RobotModel> for RobotPart {
         Self {
             name: robot.name.clone(),
             wheel_radius_m: robot.wheel_radii.mean,
-            wheel_difference: Some(robot.wheel_radii.difference).filter(|share| *share != 0.0),
+            wheel_difference: robot.wheel_radii.unlike(),
             track_width_m: robot.track_width,
             joints: robot.joints.iter().map(JointPart::from).collect(),
             shapes: robot.shapes.len(),

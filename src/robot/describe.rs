@@ -16,8 +16,8 @@ impl RobotModel {
         let rate = if self.joints.len() == 1 { "joint moves" } else { "joints move" };
         writeln!(out, "robot {}: {} {rate}", self.name, self.joints.len())?;
         write!(out, "wheel radius {:.4} m, ", self.wheel_radii.mean)?;
-        if self.wheel_radii.difference != 0.0 {
-            write!(out, "the right wheel {:+.3} % larger, ", 100.0 * self.wheel_radii.difference)?;
+        if let Some(share) = self.wheel_radii.unlike() {
+            write!(out, "the right wheel {:+.3} % larger, ", 100.0 * share)?;
         }
         writeln!(out, "track width {:.4} m", self.track_width)?;
         let ([x, y, z], (roll, pitch, yaw)) =

@@ -27,6 +27,7 @@ use std::path::Path;
 use nalgebra::{Isometry3, Unit, Vector3};
 
 use crate::diag::Diagnostics;
+use crate::geom::Pose2;
 use crate::mission::{LimitsSpec, Tolerance, ToleranceSpec};
 pub use bodies::NoFiles;
 pub use convex::Convex;
@@ -202,7 +203,17 @@ pub struct Shape {
     pub convex: Convex,
 }
 
+/// Frames that are the base, in ROS, where the URDF's root link is in no transform.
+pub const BASE_FRAMES: [&str; 2] = ["base_footprint", "base_link"];
+
 impl RobotModel {
+    /// The base in the plane, of a frame's pose: the URDF's root link is placed on the base, a frame of any other name is taken for the base.
+    pub fn base_of(&self, frame: &str, pose: Isometry3<f64>) -> Pose2 {
+        let pose = if frame == self.root_link { pose * self.base_from_root.inverse() } else { pose };
+        let forward = pose.rotation * Vector3::x();
+        Pose2::new(pose.translation.x, pose.translation.y, forward.y.atan2(forward.x))
+    }
+
     /// Whether any joint moves a body.
     pub fn is_moved(&self, mut body: usize) -> bool {
         while self.bodies[body].motion.is_none() {

@@ -17,6 +17,11 @@ impl WheelRadii {
     pub fn sides(&self) -> [f64; 2] {
         [-0.5, 0.5].map(|share| self.mean * (1.0 + share * self.difference))
     }
+
+    /// The difference, where there is one: wheels that are alike go without saying.
+    pub fn unlike(&self) -> Option<f64> {
+        Some(self.difference).filter(|share| *share != 0.0)
+    }
 }
 
 /// Both wheels alike, m.

@@ -110,7 +110,7 @@ impl Description {
             map: header.map.clone(),
             inputs_blake3: header.inputs_blake3.clone(),
             wheel_radius_m: table.wheel_radii.mean,
-            wheel_difference: Some(table.wheel_radii.difference).filter(|share| *share != 0.0),
+            wheel_difference: table.wheel_radii.unlike(),
             track_width_m: table.track_width,
             joints: table.joints.iter().map(joint).collect(),
             commands: table.into(),

@@ -2,18 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::Deserialize;
 
 use crate::geom::Pose2;
-use crate::robot::RobotModel;
+use crate::robot::{BASE_FRAMES, RobotModel};
 
 /// No chain of transforms is longer.
 const LONGEST: usize = 64;
 /// No more frames than these are remembered.
 const MOST_FRAMES: usize = 4096;
-/// Frames that are the base where the URDF's root link is in no transform.
-const BASES: [&str; 2] = ["base_footprint", "base_link"];
 
 /// `builtin_interfaces/msg/Time`.
 #[derive(Debug, Clone, Deserialize)]
@@ -90,25 +88,19 @@ struct Edge {
 /// Turns messages into poses of the base. Of transforms it remembers the latest between any two frames.
 pub struct Frames {
     world: String,
-    root_link: String,
-    root_from_base: Isometry3<f64>,
+    robot: RobotModel,
     edges: BTreeMap<String, Edge>,
 }
 
 impl Frames {
     /// `world`: the frame in which the mission's poses are; heeded of transforms alone, odometry is taken to be in it.
     pub fn new(robot: &RobotModel, world: &str) -> Self {
-        Self {
-            world: world.to_owned(),
-            root_link: robot.root_link.clone(),
-            root_from_base: robot.base_from_root.inverse(),
-            edges: BTreeMap::new(),
-        }
+        Self { world: world.to_owned(), robot: robot.clone(), edges: BTreeMap::new() }
     }
 
     /// Stamp (s) and pose of the base. A frame other than the URDF's root link is taken for the base.
     pub fn odometry(&self, message: &Odometry) -> Option<(f64, Pose2)> {
-        Some((message.header.seconds(), self.base(&message.child_frame_id, isometry(&message.pose)?)))
+        Some((message.header.seconds(), self.robot.base_of(&message.child_frame_id, isometry(&message.pose)?)))
     }
 
     /// Stamp (s) and pose of the base, if these transforms move it and there is a chain of transforms from the world's frame to it.
@@ -121,8 +113,9 @@ impl Frames {
                 self.edges.insert(edge.child_frame_id.clone(), Edge { parent, pose, fixed });
             }
         }
-        let base =
-            std::iter::once(self.root_link.as_str()).chain(BASES).find(|frame| self.edges.contains_key(*frame))?;
+        let base = std::iter::once(self.robot.root_link.as_str())
+            .chain(BASE_FRAMES)
+            .find(|frame| self.edges.contains_key(*frame))?;
         let (mut frame, mut pose, mut lowest) = (base, Isometry3::identity(), None);
         for _ in 0..LONGEST {
             if frame == self.world {
@@ -135,13 +128,7 @@ impl Frames {
         // Where frames go round, the world's is never reached.
         let moved = lowest.filter(|_| frame == self.world)?;
         let told = message.transforms.iter().rfind(|edge| edge.child_frame_id == moved)?;
-        Some((told.header.seconds(), self.base(base, pose)))
-    }
-
-    fn base(&self, frame: &str, pose: Isometry3<f64>) -> Pose2 {
-        let pose = if frame == self.root_link { pose * self.root_from_base } else { pose };
-        let forward = pose.rotation * Vector3::x();
-        Pose2::new(pose.translation.x, pose.translation.y, forward.y.atan2(forward.x))
+        Some((told.header.seconds(), self.robot.base_of(base, pose)))
     }
 }
 
