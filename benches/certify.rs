@@ -8,6 +8,7 @@ use trajc::certify::{Goal, Task, certify};
 use trajc::command::{CommandRow, CommandTable};
 use trajc::geom::Pose2;
 use trajc::map::VoxelMap;
+use trajc::math::real;
 use trajc::mission::{Sampling, Unknown};
 use trajc::robot::{
     BaseLimits, Body, BodyMotion, Convex, IgnoreReason, IgnoredPair, MotionLimits, MovingJoint, RobotModel, Shape,
@@ -88,7 +89,7 @@ fn commands(robot: &RobotModel) -> (CommandTable, Task) {
     for k in 0..=250 {
         let (speed, turn, rate) = match k {
             250 => (0.0, 0.0, 0.0),
-            _ => (0.4, 0.5 * (0.05 * f64::from(k)).cos(), 0.5 * (0.06 * f64::from(k)).sin()),
+            _ => (0.4, 0.5 * real::cos(0.05 * f64::from(k)), 0.5 * real::sin(0.06 * f64::from(k))),
         };
         let difference = 0.5 * turn * robot.track_width;
         table.rows.push(CommandRow {
@@ -113,7 +114,7 @@ fn map(table: &CommandTable, room: f64, density: f64) -> VoxelMap {
     for i in 0..map.dims[0] {
         for j in 0..map.dims[1] {
             let cube = map.cube([i, j, 0]);
-            let path = table.rows.iter().map(|row| (row.pose.x - cube.min[0]).hypot(row.pose.y - cube.min[1]));
+            let path = table.rows.iter().map(|row| real::hypot(row.pose.x - cube.min[0], row.pose.y - cube.min[1]));
             if path.fold(f64::INFINITY, f64::min) < room {
                 continue;
             }

@@ -4,6 +4,7 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{Isometry3, Vector3};
 use trajc::geom::Pose2;
+use trajc::math::real;
 use trajc::mission::Parameterisation;
 use trajc::optimize::minco::Minco;
 use trajc::optimize::{DistanceField, OptimizeOptions, optimize_in};
@@ -92,7 +93,7 @@ fn path(steps: &[(f64, f64)]) -> SearchPath {
     for &(turn, length) in steps {
         let from = states[states.len() - 1].pose;
         let yaw = from.yaw + turn;
-        let pose = Pose2::new(from.x + length * yaw.cos(), from.y + length * yaw.sin(), yaw);
+        let pose = Pose2::new(from.x + length * real::cos(yaw), from.y + length * real::sin(yaw), yaw);
         states.push(SearchState { pose, joints: Vec::new() });
         moves.push(if length == 0.0 { SearchMove::Still } else { SearchMove::Forward });
     }
@@ -104,7 +105,7 @@ fn benches(criterion: &mut Criterion) {
     let mut end = vec![0.0; 4 * m];
     end[0] = 4.0;
     let mut curve = Minco::new(pieces, &vec![0.0; 4 * m], &end);
-    let waypoints: Vec<f64> = (0..(pieces - 1) * m).map(|i| (i as f64 * 0.7).sin()).collect();
+    let waypoints: Vec<f64> = (0..(pieces - 1) * m).map(|i| real::sin(i as f64 * 0.7)).collect();
     let durations: Vec<f64> = (0..pieces).map(|i| 0.8 + 0.1 * i as f64).collect();
     let by = vec![0.5; pieces * 8 * m];
     let (mut by_waypoints, mut by_durations) = (vec![0.0; waypoints.len()], vec![0.0; pieces]);
@@ -140,7 +141,7 @@ fn benches(criterion: &mut Criterion) {
             .map(|w| {
                 let side = (w[2].pose.yaw - w[1].pose.yaw).signum();
                 let out = 0.5 * (w[1].pose.yaw + w[2].pose.yaw) + side * std::f64::consts::FRAC_PI_2;
-                [w[1].pose.x + 0.62 * out.cos(), w[1].pose.y + 0.62 * out.sin(), 0.2]
+                [w[1].pose.x + 0.62 * real::cos(out), w[1].pose.y + 0.62 * real::sin(out), 0.2]
             })
             .collect(),
     );

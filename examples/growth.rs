@@ -8,6 +8,7 @@ use std::time::Instant;
 use trajc::esdf;
 use trajc::geom::{Aabb, Pose2};
 use trajc::map::VoxelMap;
+use trajc::math::real;
 use trajc::mission::Unknown;
 use trajc::robot::{self, NoFiles, RobotInputs, RobotModel, spec};
 use trajc::search::{self, Query, SearchOptions};
@@ -63,7 +64,7 @@ fn boxes(side: f64, density: f64) -> Vec<Aabb> {
     for _ in 0..(density * side * side) as usize {
         let (x, y) = (draw(0.0, side), draw(0.0, side));
         let (a, b) = (scale * draw(0.3, 0.8), scale * draw(0.3, 0.8));
-        let near = |end: f64| (x + a / 2.0 - end).hypot(y + b / 2.0 - end) < 1.5;
+        let near = |end: f64| real::hypot(x + a / 2.0 - end, y + b / 2.0 - end) < 1.5;
         if !near(1.0) && !near(side - 1.0) {
             out.push(Aabb { min: [x, y, 0.0], max: [(x + a).min(side), (y + b).min(side), 0.2] });
         }

@@ -1,5 +1,6 @@
 //! Poses and boxes in SI units. Transforms read so that neighbours cancel: `map_from_base * base_from_link`.
 
+use crate::math::real;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 /// A pose of the base frame on the floor: metres and radians, map frame. `yaw` is not wrapped; it may run past pi.
@@ -23,13 +24,13 @@ impl Pose2 {
     pub fn after_twist(self, v: f64, omega: f64, dt: f64) -> Self {
         let half_turn = 0.5 * omega * dt;
         let chord = v * dt * sinc(half_turn);
-        let (sin, cos) = (self.yaw + half_turn).sin_cos();
+        let (sin, cos) = real::sin_cos(self.yaw + half_turn);
         Self { x: self.x + chord * cos, y: self.y + chord * sin, yaw: self.yaw + 2.0 * half_turn }
     }
 
     /// Distance between two positions, in metres.
     pub fn distance(self, other: Self) -> f64 {
-        (self.x - other.x).hypot(self.y - other.y)
+        real::hypot(self.x - other.x, self.y - other.y)
     }
 
     /// The transform map <- base.
@@ -47,7 +48,7 @@ pub fn sinc(x: f64) -> f64 {
         let x2 = x * x;
         1.0 - x2 / 6.0 * (1.0 - x2 / 20.0)
     } else {
-        x.sin() / x
+        real::sin(x) / x
     }
 }
 
@@ -66,7 +67,7 @@ pub fn unwrap_near(angle: f64, reference: f64) -> f64 {
 /// Distance from a point to the area that a closed polygon winds around, zero within it and on its edge; same unit as the corners.
 pub fn distance_to_area(p: [f64; 2], polygon: &[[f64; 2]]) -> f64 {
     let foot = nearest_in_area(p, polygon);
-    (p[0] - foot[0]).hypot(p[1] - foot[1])
+    real::hypot(p[0] - foot[0], p[1] - foot[1])
 }
 
 /// The point of the area that a closed polygon winds around that is nearest to a point: itself, within it.
@@ -76,7 +77,7 @@ pub fn nearest_in_area(p: [f64; 2], polygon: &[[f64; 2]]) -> [f64; 2] {
         let (side, off) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
         let length = side[0] * side[0] + side[1] * side[1];
         let along = if length > 0.0 { (off[0] * side[0] + off[1] * side[1]) / length } else { 0.0 }.clamp(0.0, 1.0);
-        let square = (off[0] - along * side[0]).powi(2) + (off[1] - along * side[1]).powi(2);
+        let square = real::powi(off[0] - along * side[0], 2) + real::powi(off[1] - along * side[1], 2);
         if square < nearest.0 {
             nearest = (square, [a[0] + along * side[0], a[1] + along * side[1]]);
         }
@@ -108,7 +109,7 @@ impl Aabb {
 
     /// Distance from a point to the box, zero inside, in metres.
     pub fn distance(&self, p: &Point3<f64>) -> f64 {
-        (0..3).map(|i| (self.min[i] - p[i]).max(p[i] - self.max[i]).max(0.0).powi(2)).sum::<f64>().sqrt()
+        (0..3).map(|i| real::powi((self.min[i] - p[i]).max(p[i] - self.max[i]).max(0.0), 2)).sum::<f64>().sqrt()
     }
 }
 
@@ -129,7 +130,7 @@ mod tests {
             ([3.0, 1.0], 1.0),
             ([-3.0, -4.0], 5.0),
             // In the notch: 0.15 m from both of its sides, which rise 1.5 m in 0.2 m.
-            ([1.0, 1.625], 0.15 / 1.5f64.hypot(0.2) * 1.5),
+            ([1.0, 1.625], 0.15 / real::hypot(1.5, 0.2) * 1.5),
         ] {
             assert!(
                 (distance_to_area(p, &notched) - distance).abs() < 1e-12,

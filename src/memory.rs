@@ -89,7 +89,7 @@ pub fn parse(text: &str) -> Option<u64> {
         unit => (1024.0, unit),
     };
     let power = ["", "k", "m", "g", "t"].iter().position(|known| *known == unit)?;
-    let bytes = number * f64::powi(thousand, power as i32);
+    let bytes = (0..power).fold(number, |bytes, _| bytes * thousand);
     // Less than a mebibyte holds no mission.
     (1_048_576.0..1e18).contains(&bytes).then_some(bytes as u64)
 }

@@ -20,6 +20,7 @@ use crate::command::{self, CommandTable, SampleOptions};
 use crate::diag::{Describe, Diagnostic, Diagnostics};
 use crate::geom::{Pose2, wrap_angle};
 use crate::map::VoxelMap;
+use crate::math::real;
 use crate::mission::{Mission, Parameterisation, PathSpec, PoseSpec, TimeLaw, Tolerance};
 use crate::report::schema::{InputFile, InputsPart};
 use crate::report::schema::{ProfilePart, TrajectoryPart, TrustPart};
@@ -425,7 +426,7 @@ fn end_of(trajectory: &Trajectory) -> Pose2 {
             let end = drive.curve.duration();
             let [x, y, dx, dy] =
                 [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(d, order)| drive.curve.derivative(d, order, end));
-            let yaw = dy.atan2(dx) + if drive.reverse { std::f64::consts::PI } else { 0.0 };
+            let yaw = real::atan2(dy, dx) + if drive.reverse { std::f64::consts::PI } else { 0.0 };
             Pose2::new(x, y, wrap_angle(yaw))
         }
         // Only planned motions have such legs, and those that cannot be tabulated have been refused.
@@ -496,7 +497,7 @@ fn given_path(
         let Some(spec) = spec else { continue };
         let off = |a: Option<f64>, b: f64| a.is_some_and(|a| (a - b).abs() > 1e-6);
         let elsewhere = match spec.x.zip(spec.y) {
-            Some((x, y)) if spec.within > 0.0 => (x - own.x).hypot(y - own.y) > spec.within,
+            Some((x, y)) if spec.within > 0.0 => real::hypot(x - own.x, y - own.y) > spec.within,
             _ => off(spec.x, own.x) || off(spec.y, own.y),
         };
         if elsewhere || spec.yaw.is_some_and(|yaw| wrap_angle(yaw - own.yaw).abs() > 1e-6) {

@@ -13,6 +13,7 @@ use trajc::command::CommandTable;
 use trajc::geom::{Aabb, Pose2};
 use trajc::inputs;
 use trajc::map::VoxelMap;
+use trajc::math::real;
 use trajc::pipeline::{self, CompileOptions};
 use trajc::robot::{Convex, RobotModel};
 
@@ -48,11 +49,11 @@ fn driven(table: &CommandTable, row: usize, (pose, joints): &State, tau: f64) ->
     let [left, right] = [held.wheel_left, held.wheel_right].map(|w| w * table.wheel_radii.mean * tau);
     let (along, turn) = (0.5 * (left + right), (right - left) / table.track_width);
     let (x, y) = if turn.abs() < 1e-7 {
-        (along * (pose.yaw + 0.5 * turn).cos(), along * (pose.yaw + 0.5 * turn).sin())
+        (along * real::cos(pose.yaw + 0.5 * turn), along * real::sin(pose.yaw + 0.5 * turn))
     } else {
         let radius = along / turn;
         let end = pose.yaw + turn;
-        (radius * (end.sin() - pose.yaw.sin()), radius * (pose.yaw.cos() - end.cos()))
+        (radius * (real::sin(end) - real::sin(pose.yaw)), radius * (real::cos(pose.yaw) - real::cos(end)))
     };
     let joints = joints.iter().zip(&held.joint_velocities).map(|(q, rate)| q + rate * tau).collect();
     (Pose2::new(pose.x + x, pose.y + y, pose.yaw + turn), joints)

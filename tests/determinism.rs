@@ -135,6 +135,20 @@ fn wherever_and_for_whomever() {
     }
 }
 
+/// glibc has functions of its own for processors with fused multiply-add, which round otherwise: none of them may be in use.
+#[test]
+fn on_a_processor_without_fused_multiply_add() {
+    let (sandbox, first) = built();
+    let output = Command::new(env!("CARGO_BIN_EXE_trajc"))
+        .args(["build", "-k", "--force"])
+        .current_dir(sandbox.path("."))
+        .env("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-FMA,-FMA4,-AVX2,-AVX2_Usable,-FMA_Usable")
+        .output()
+        .expect("the program starts");
+    assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stderr));
+    same(&first, &outputs(&sandbox, "out"), "without fused multiply-add");
+}
+
 #[test]
 fn another_build_of_the_program_writes_the_same() {
     let Some(other) = std::env::var_os("TRAJC_OTHER").map(PathBuf::from) else {

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::process::{Command, Output};
+use trajc::math::real;
 
 use serde_json::Value;
 
@@ -213,7 +214,7 @@ fn driven(rims: &[[f64; 2]], [mut x, mut y, mut yaw]: [f64; 3], clip: f64) -> [f
     for [left, right] in rims.iter().map(|rims| rims.map(|v| v.clamp(-clip, clip))) {
         let (step, turn) = (0.5 * (left + right) * 0.1 / STEPS as f64, (right - left) / 0.4 * 0.1 / STEPS as f64);
         for _ in 0..STEPS {
-            let (sin, cos) = (yaw + 0.5 * turn).sin_cos();
+            let (sin, cos) = real::sin_cos(yaw + 0.5 * turn);
             (x, y, yaw) = (x + step * cos, y + step * sin, yaw + turn);
         }
     }
@@ -237,7 +238,7 @@ fn curves_stand_beside_the_optimum_and_what_the_paper_found_takes_the_clip_and_n
         let segments: Vec<[[f64; 2]; 4]> =
             serde_json::from_value(curve["control_points_m"].clone()).expect("control points");
         let ([from, handle, ..], [.., to]) = (segments[0], segments[segments.len() - 1]);
-        let start = [from[0], from[1], (handle[1] - from[1]).atan2(handle[0] - from[0])];
+        let start = [from[0], from[1], real::atan2(handle[1] - from[1], handle[0] - from[0])];
         let rows = curve["rows"].as_array().expect("a list");
         for row in rows {
             let name = format!("{id}/{}.csv", row["name"].as_str().expect("text"));
@@ -253,7 +254,7 @@ fn curves_stand_beside_the_optimum_and_what_the_paper_found_takes_the_clip_and_n
             }
             for (clip, key) in [(f64::INFINITY, "end_point"), (0.5, "end_point_clipped")] {
                 let end = driven(&rims, start, clip);
-                let miss = (end[0] - to[0]).hypot(end[1] - to[1]);
+                let miss = real::hypot(end[0] - to[0], end[1] - to[1]);
                 assert!((number(&row[key]["distance_m"]) - miss).abs() < 1e-6, "{name}: {miss} in {row}");
             }
             let keeps = found.iter().zip([0.5, 0.2, 0.2]).all(|(peak, limit)| *peak <= limit * (1.0 + 1e-9));

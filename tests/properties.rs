@@ -7,6 +7,7 @@ use trajc::command::CommandTable;
 use trajc::emit::csv::{self, CsvHeader};
 use trajc::geom::{Pose2, wrap_angle};
 use trajc::inputs;
+use trajc::math::real;
 use trajc::pipeline::{self, CompileOptions, Outcome};
 
 /// A mission on the small shipped map.
@@ -65,7 +66,7 @@ proptest! {
         prop_assert_eq!(&table, &done.commands);
 
         let end = replay(&table);
-        prop_assert!((end.x - goal[0]).hypot(end.y - goal[1]) <= END_POINT_TOLERANCE + 1e-9, "{end:?}");
+        prop_assert!(real::hypot(end.x - goal[0], end.y - goal[1]) <= END_POINT_TOLERANCE + 1e-9, "{end:?}");
         prop_assert!(wrap_angle(end.yaw - goal[2]).abs() <= END_ANGLE_TOLERANCE + 1e-9, "{end:?}");
         let last = table.rows.last().expect("rows");
         prop_assert!(last.wheel_left == 0.0 && last.wheel_right == 0.0);

@@ -6,6 +6,7 @@ use trajc::command::{CommandRow, CommandTable};
 use trajc::geom::Pose2;
 use trajc::inputs;
 use trajc::map::VoxelMap;
+use trajc::math::real;
 use trajc::mission::{Tolerance, ToleranceSpec};
 use trajc::pipeline::{self, CompileOptions};
 use trajc::robot::RobotModel;
@@ -70,7 +71,7 @@ fn another(table: &CommandTable, start: Pose2, tolerance: &Tolerance, shares: [f
         row.wheel_right *= mean + half;
     }
     let far = far.abs() * tolerance.start_distance;
-    let (sin, cos) = (std::f64::consts::PI * direction).sin_cos();
+    let (sin, cos) = real::sin_cos(std::f64::consts::PI * direction);
     let yaw = start.yaw + heading * tolerance.start_angle;
     (own, Pose2::new(start.x + far * cos, start.y + far * sin, yaw))
 }
@@ -184,7 +185,7 @@ fn nor_on_any_shipped_mission_with_the_largest_part_of_the_usual_tolerance_that_
         let usual = Tolerance::ASSUMED;
         let hold = compiled(&mission).table.sampling_time;
         let found = (0..8).find_map(|halved| {
-            let part = 0.5f64.powi(halved);
+            let part = real::powi(0.5, halved);
             let spec = ToleranceSpec {
                 wheel_radius: Some(part * usual.wheel_radius),
                 wheel_difference: Some(part * usual.wheel_difference),

@@ -15,6 +15,7 @@ mod rewrite;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::geom::{Pose2, wrap_angle};
+use crate::math::real;
 
 pub use bag::{BagError, Topics, read_mcap};
 pub use log::{Log, LogError, read_csv};
@@ -206,7 +207,7 @@ impl Pair {
 
 /// Coordinates of a pose in the frame of another, m.
 fn seen_from(frame: Pose2, pose: Pose2) -> [f64; 2] {
-    let (sin, cos) = frame.yaw.sin_cos();
+    let (sin, cos) = real::sin_cos(frame.yaw);
     let (dx, dy) = (pose.x - frame.x, pose.y - frame.y);
     [cos * dx + sin * dy, cos * dy - sin * dx]
 }
@@ -238,7 +239,7 @@ fn pairs(log: &Log, guess: Geometry, noise: PoseNoise) -> Vec<Pair> {
         let measured = Vector3::new(off[0], off[1], about + wrap_angle(second.yaw - pose.yaw - about));
         // To first order: both positions, both headings; the first heading turns what is seen.
         let seen = Vector3::new(off[1], -off[0], -1.0);
-        let (m2, r2) = (noise.metres.powi(2), noise.radians.powi(2));
+        let (m2, r2) = (real::powi(noise.metres, 2), real::powi(noise.radians, 2));
         let mut spread = Matrix3::from_diagonal(&Vector3::new(2.0 * m2, 2.0 * m2, r2));
         spread += seen * seen.transpose() * r2;
         let Some(whiten) = spread.cholesky().and_then(|c| c.l().try_inverse()) else { continue };

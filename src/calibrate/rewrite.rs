@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::Fit;
 use crate::diag::yaml::{self, Node};
 use crate::diag::{Diagnostics, Source};
+use crate::math::real;
 
 /// Why it cannot be put in.
 #[derive(Debug)]
@@ -25,7 +26,7 @@ pub fn rewrite(name: &str, text: &str, fit: &Fit) -> Result<String, RewriteError
     let remaining = fit.remaining();
     // Digits that mean something: to a tenth of the standard deviation.
     let decimal = |value: f64, deviation: f64| {
-        let places = (1.0 - deviation.max(1e-9).log10()).ceil().clamp(3.0, 9.0) as usize;
+        let places = (1.0 - real::log10(deviation.max(1e-9))).ceil().clamp(3.0, 9.0) as usize;
         format!("{value:.places$}")
     };
     let larger = match fit.larger_right() {
@@ -49,8 +50,8 @@ fn rounded(value: f64, digits: i32) -> String {
     if value <= 0.0 {
         return "0".to_owned();
     }
-    let places = (digits - 1 - value.log10().floor() as i32).max(0);
-    let scale = 10f64.powi(places);
+    let places = (digits - 1 - real::log10(value).floor() as i32).max(0);
+    let scale = real::powi(10.0, places);
     format!("{:.*}", places as usize, (value * scale - 1e-9).ceil() / scale)
 }
 

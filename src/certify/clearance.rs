@@ -15,6 +15,7 @@ use super::tube::{Shares, Tube, Width};
 use super::{Closest, Refusal, RefusalKind};
 use crate::geom::{Aabb, Pose2};
 use crate::map::VoxelMap;
+use crate::math::real;
 use crate::robot::RobotModel;
 
 /// The clearance proven is within this of the least distance found, m (except close to the requirement, where it is nearer).
@@ -520,5 +521,5 @@ pub(super) fn beyond(edge: &Edge, bounds: &Aabb) -> f64 {
 
 /// Distance of two axis-aligned boxes, m.
 pub(super) fn gap(a: &Aabb, b: &Aabb) -> f64 {
-    (0..3).map(|i| (a.min[i] - b.max[i]).max(b.min[i] - a.max[i]).max(0.0).powi(2)).sum::<f64>().sqrt()
+    (0..3).map(|i| real::powi((a.min[i] - b.max[i]).max(b.min[i] - a.max[i]).max(0.0), 2)).sum::<f64>().sqrt()
 }

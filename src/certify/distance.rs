@@ -212,6 +212,7 @@ pub(super) fn nearest_along(normal: &Vector3<f64>, obstacle: &Aabb, from: &Vecto
 
 #[cfg(test)]
 mod tests {
+    use crate::math::real;
     use nalgebra::Isometry3;
     use parry3d_f64::math::Vector;
     use parry3d_f64::query;
@@ -311,7 +312,7 @@ mod tests {
                 [-turn, turn].map(|angle| d.dot(&(p + Vector3::z().cross(&p) * angle)))
             });
             let shifts: f64 = along.iter().map(|v| (v[0] * d.x + v[1] * d.y).abs()).sum();
-            let expected = farthest.fold(f64::NEG_INFINITY, f64::max) + shifts + disc * d.x.hypot(d.y) + ball * d.norm();
+            let expected = farthest.fold(f64::NEG_INFINITY, f64::max) + shifts + disc * real::hypot(d.x, d.y) + ball * d.norm();
             prop_assert!((shape.reach(&d) - expected).abs() < 1e-12);
             prop_assert!((d.dot(&shape.support(&d)) - expected).abs() < 1e-12, "the point there");
         }

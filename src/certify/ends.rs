@@ -3,6 +3,7 @@
 use super::rollout::Rollout;
 use super::{END_ANGLE_TOLERANCE, END_POINT_TOLERANCE, Goal, Refusal, RefusalKind, within};
 use crate::geom::wrap_angle;
+use crate::math::real;
 use crate::robot::RobotModel;
 
 /// How far from the goal the replay ends.
@@ -19,7 +20,7 @@ pub(super) struct Ends {
 pub(super) fn ends(rollout: &Rollout<'_>, robot: &RobotModel, goal: &Goal) -> Ends {
     let last = rollout.rows() - 1;
     let pose = rollout.pose(last, 0.0);
-    let point = (pose.x - goal.x).hypot(pose.y - goal.y);
+    let point = real::hypot(pose.x - goal.x, pose.y - goal.y);
     let heading = goal.yaw.map(|yaw| wrap_angle(pose.yaw - yaw).abs());
     let mut refusals = Vec::new();
     let mut refuse = |error: f64, tolerance: f64, message: &dyn Fn() -> String| {

@@ -9,6 +9,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::distance::{Posed, Spread};
 use crate::geom::Pose2;
+use crate::math::real;
 use crate::robot::{Convex, RobotModel, Shape};
 
 /// What the commands hold during a row.
@@ -180,7 +181,7 @@ impl<'a> Kinematics<'a> {
     pub(super) fn shape(&self, shape: usize, bodies: &[Moving], pose: Pose2, acceleration: f64) -> MovingShape<'a> {
         let facts = &self.shapes[shape];
         let body = &bodies[self.robot.shapes[shape].body];
-        let (sin, cos) = pose.yaw.sin_cos();
+        let (sin, cos) = real::sin_cos(pose.yaw);
         let map = Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0);
         let centre = body.turn * facts.at + body.at;
         MovingShape {
@@ -302,7 +303,7 @@ mod tests {
         let held = Held { speed: 0.0, turn_rate: 0.7, rates: &[1.1, 1.3] };
         let bound = Kinematics::new(&robot).acceleration(0, held, &[0.0, 0.0]);
         // Towards each axis, at the rate at which what is behind it turns in all.
-        let expected = 0.7f64.powi(2) * (0.2 + 0.3) + 1.8f64.powi(2) * 0.4 + 3.1f64.powi(2) * 0.5;
+        let expected = real::powi(0.7, 2) * (0.2 + 0.3) + real::powi(1.8, 2) * 0.4 + real::powi(3.1, 2) * 0.5;
         assert!((bound - expected).abs() < 1e-12, "{bound} {expected}");
     }
 
@@ -317,7 +318,7 @@ mod tests {
             let arm =
                 with_body(with_joint(bare_robot(), false), 0, Isometry3::identity(), [1.0, 0.0, 0.0], (0, 1.0, 0.0));
             let arm = with_shape(arm, 1, Isometry3::translation(x, y, z), brick());
-            for (robot, rate, lever) in [(base, 0.0, 0.7f64.hypot(0.4)), (arm, 1.0, 0.4f64.hypot(0.45))] {
+            for (robot, rate, lever) in [(base, 0.0, real::hypot(0.7, 0.4)), (arm, 1.0, real::hypot(0.4, 0.45))] {
                 let bound = Kinematics::new(&robot).acceleration(0, turning(rate), &[0.0]);
                 assert!((bound - lever).abs() < 1e-12, "({x}, {y}, {z}): {bound} {lever}");
             }
@@ -372,7 +373,7 @@ mod tests {
         near(centre, 1.5);
         near(against, 0.3);
         // Over a longer time, as much more as the corners of the box around the ball are accelerated.
-        let gained = 0.1 * 3.0f64.powi(2) * 0.6f64.hypot(0.1);
+        let gained = 0.1 * real::powi(3.0, 2) * real::hypot(0.6, 0.1);
         let [centre, against] = shape(0.0, 3.0).fastest(0.1);
         near(centre, 1.5 + gained);
         near(against, 0.3 + 2.0 * gained);

@@ -100,6 +100,7 @@ mod tests {
     use super::*;
     use crate::certify::tests::robots::{bare_robot, commands};
     use crate::command::CommandRow;
+    use crate::math::real;
     use crate::mission::Sampling;
 
     #[test]
@@ -122,7 +123,9 @@ mod tests {
         let rollout = Rollout::new(&table, Pose2::default(), &[0.1]);
         // 0.2 m/s at 0.5 rad/s: a circle of radius 0.4 m.
         let pose = rollout.pose(0, 0.3);
-        assert!((pose.x - 0.4 * 0.15f64.sin()).abs() < 1e-15 && (pose.y - 0.4 * (1.0 - 0.15f64.cos())).abs() < 1e-15);
+        assert!(
+            (pose.x - 0.4 * real::sin(0.15)).abs() < 1e-15 && (pose.y - 0.4 * (1.0 - real::cos(0.15))).abs() < 1e-15
+        );
         assert_eq!(rollout.pose(0, 0.5), rollout.pose(1, 0.0));
         assert!((rollout.pose(2, 0.0).yaw - 0.5).abs() < 1e-15);
         assert!((rollout.joints(2)[0] + 0.1).abs() < 1e-15);
@@ -134,7 +137,7 @@ mod tests {
     #[test]
     fn rounding_far_away_is_no_more_than_its_bound_and_the_bound_is_small() {
         let robot = bare_robot();
-        let held: Vec<_> = (0..2000).map(|k| (0.5, (0.37 * f64::from(k)).sin(), Vec::new())).collect();
+        let held: Vec<_> = (0..2000).map(|k| (0.5, real::sin(0.37 * f64::from(k)), Vec::new())).collect();
         let far = 8e5;
         let near = commands(&robot, Pose2::new(0.0, 0.0, 0.3), &[], 0.1, &held).0;
         let (origin, away) = (Pose2::new(0.0, 0.0, 0.3), Pose2::new(far, -far, 0.3));
@@ -143,7 +146,7 @@ mod tests {
         assert!(bound < 1e-5 && small < 1e-8 && small > 100.0 * f64::EPSILON, "{small} {bound}");
         let off = (0..there.rows()).map(|row| {
             let (a, b) = (here.pose(row, 0.0), there.pose(row, 0.0));
-            (b.x - far - a.x).hypot(b.y + far - a.y)
+            real::hypot(b.x - far - a.x, b.y + far - a.y)
         });
         let worst = off.fold(0.0, f64::max);
         assert!(worst > 0.0 && worst <= bound, "{worst} {bound}");

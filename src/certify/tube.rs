@@ -12,6 +12,7 @@ use super::distance::Spread;
 use super::motion::MovingShape;
 use super::rollout::Rollout;
 use crate::geom::sinc;
+use crate::math::real;
 use crate::mission::Tolerance;
 use crate::robot::RobotModel;
 
@@ -103,7 +104,7 @@ struct Node {
 pub(super) type Drift = [Vector2<f64>; 4];
 
 fn unit(yaw: f64) -> Vector2<f64> {
-    Vector2::new(yaw.cos(), yaw.sin())
+    Vector2::new(real::cos(yaw), real::sin(yaw))
 }
 
 /// A quarter turn to the left.
@@ -117,7 +118,7 @@ fn lag(x: f64) -> f64 {
         let x2 = x * x;
         -x / 3.0 * (1.0 - x2 / 10.0 * (1.0 - x2 / 28.0))
     } else {
-        (x.cos() - x.sin() / x) / x
+        (real::cos(x) - real::sin(x) / x) / x
     }
 }
 
@@ -331,7 +332,7 @@ mod tests {
             let weighed = (0..=steps).map(|k| {
                 let s = f64::from(k) / f64::from(steps);
                 let weight = if k == 0 || k == steps { 1.0 } else { 2.0 + 2.0 * f64::from(k % 2) };
-                weight * s * (s * x).sin()
+                weight * s * real::sin(s * x)
             });
             let integral = -weighed.sum::<f64>() / (3.0 * f64::from(steps));
             // The closed form loses digits where it is a difference of nearly equal numbers.

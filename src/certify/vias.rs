@@ -3,6 +3,7 @@
 use super::rollout::Rollout;
 use super::{END_ANGLE_TOLERANCE, END_POINT_TOLERANCE, Goal, Reached, Refusal, RefusalKind, Via, within};
 use crate::geom::wrap_angle;
+use crate::math::real;
 use crate::robot::RobotModel;
 
 /// Rounding of a dwell that is a whole number of rows, s.
@@ -23,7 +24,7 @@ pub(super) fn vias(
                 let pose = rollout.pose(first, 0.0);
                 reached.push(Reached {
                     time: rollout.time(first, 0.0),
-                    point_error: (pose.x - via.place.x).hypot(pose.y - via.place.y),
+                    point_error: real::hypot(pose.x - via.place.x, pose.y - via.place.y),
                     heading_error: via.place.yaw.map(|yaw| wrap_angle(pose.yaw - yaw).abs()),
                 });
                 row = next;
@@ -55,7 +56,7 @@ fn stand(
         }
         let end = (row..=last).find(|k| !standing[*k]).unwrap_or(last + 1);
         let pose = rollout.pose(row, 0.0);
-        let off = (pose.x - via.place.x).hypot(pose.y - via.place.y);
+        let off = real::hypot(pose.x - via.place.x, pose.y - via.place.y);
         if as_said(rollout, row, robot, &via.place) {
             let stood = rollout.time(end.min(last), 0.0) - rollout.time(row, 0.0);
             if stood >= via.dwell - ROUNDING {
@@ -78,7 +79,7 @@ fn stand(
 /// Whether the robot is in a place as the certificate understands a goal, when a row begins.
 fn as_said(rollout: &Rollout<'_>, row: usize, robot: &RobotModel, place: &Goal) -> bool {
     let pose = rollout.pose(row, 0.0);
-    let point = within((pose.x - place.x).hypot(pose.y - place.y), place.allowed());
+    let point = within(real::hypot(pose.x - place.x, pose.y - place.y), place.allowed());
     let heading = place.yaw.is_none_or(|yaw| within(wrap_angle(pose.yaw - yaw).abs(), END_ANGLE_TOLERANCE));
     let joints = robot.joints.iter().zip(&place.joints).zip(rollout.joints(row)).all(|((joint, wanted), value)| {
         let tolerance = if joint.prismatic { END_POINT_TOLERANCE } else { END_ANGLE_TOLERANCE };

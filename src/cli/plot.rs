@@ -2,6 +2,7 @@
 
 use crate::command::CommandTable;
 use crate::map::VoxelMap;
+use crate::math::real;
 use crate::mission::{Mission, PathSpec};
 use crate::pipeline::World;
 use crate::report::PathErrorRow;
@@ -99,7 +100,7 @@ pub(super) fn mission(mission: &Mission, world: &World) -> Figure {
 
 fn bezier(points: &[[f64; 2]; 4], k: usize) -> [f64; 2] {
     let u = k as f64 / POINTS as f64;
-    let weights = [(1.0 - u).powi(3), 3.0 * u * (1.0 - u).powi(2), 3.0 * u * u * (1.0 - u), u.powi(3)];
+    let weights = [real::powi(1.0 - u, 3), 3.0 * u * real::powi(1.0 - u, 2), 3.0 * u * u * (1.0 - u), real::powi(u, 3)];
     [0, 1].map(|a| points.iter().zip(weights).map(|(p, w)| w * p[a]).sum())
 }
 

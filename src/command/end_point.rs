@@ -5,6 +5,7 @@
 //! its first two differences at every stop. Of all such corrections it is the least in that weight, found by Newton's iteration.
 
 use crate::geom::{Pose2, sinc};
+use crate::math::real;
 
 use super::CommandTable;
 
@@ -47,7 +48,7 @@ pub fn close(table: &mut CommandTable, start: Pose2, end: Pose2, tolerance: f64)
     let directions: Vec<[f64; 2]> = (0..table.rows.len())
         .map(|k| {
             let half_turn = 0.5 * hold * table.twist(k).1;
-            let (sin, cos) = (poses[k].yaw + half_turn).sin_cos();
+            let (sin, cos) = real::sin_cos(poses[k].yaw + half_turn);
             [cos * sinc(half_turn), sin * sinc(half_turn)]
         })
         .collect();
@@ -62,7 +63,7 @@ pub fn close(table: &mut CommandTable, start: Pose2, end: Pose2, tolerance: f64)
     for _ in 0..3 {
         let reached = table.replay(start).last().copied().unwrap_or(start);
         let gap = [end.x - reached.x, end.y - reached.y];
-        if gap[0].hypot(gap[1]) <= CLOSED {
+        if real::hypot(gap[0], gap[1]) <= CLOSED {
             break;
         }
         let multiplier = least_norm(gram, gap);
@@ -89,10 +90,10 @@ pub fn close(table: &mut CommandTable, start: Pose2, end: Pose2, tolerance: f64)
 /// Solves the symmetric system [[g0, g1], [g1, g2]] x = b; a direction that the path hardly has is left out.
 fn least_norm(g: [f64; 3], b: [f64; 2]) -> [f64; 2] {
     let (mean, half) = (0.5 * (g[0] + g[2]), 0.5 * (g[0] - g[2]));
-    let radius = half.hypot(g[1]);
+    let radius = real::hypot(half, g[1]);
     // Eigenvectors at half the angle of (half, g1).
-    let angle = 0.5 * g[1].atan2(half);
-    let (sin, cos) = angle.sin_cos();
+    let angle = 0.5 * real::atan2(g[1], half);
+    let (sin, cos) = real::sin_cos(angle);
     let mut x = [0.0; 2];
     for (value, axis) in [(mean + radius, [cos, sin]), (mean - radius, [-sin, cos])] {
         if value > 1e-9 * mean {

@@ -1,5 +1,6 @@
 //! The limits of the table as written: first and second differences of what is held, at rest before and after.
 
+use crate::math::real;
 use crate::robot::{MotionLimits, RobotModel};
 
 use super::CommandTable;
@@ -36,7 +37,7 @@ fn of_actuator(speeds: impl Iterator<Item = f64>, limits: &MotionLimits, hold: f
         // What is rounding is no excess; a true one is corrected whole.
         if ratio <= 1.0 + ROUNDING { ratio.min(1.0) } else { ratio }
     });
-    speed.max(acceleration.sqrt()).max(jerk.cbrt())
+    speed.max(acceleration.sqrt()).max(real::cbrt(jerk))
 }
 
 /// Largest |speed|, |first difference|/hold and |second difference|/hold^2 of held speeds, at rest before and after.

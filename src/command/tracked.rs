@@ -10,6 +10,7 @@
 mod regulator;
 
 use crate::geom::{Pose2, sinc};
+use crate::math::real;
 use crate::robot::{MotionLimits, RobotModel};
 
 use super::CommandTable;
@@ -45,7 +46,7 @@ pub(super) fn correct(table: &mut CommandTable, robot: &RobotModel, closeness: f
     }
     let mut rows = weights(table, robot, &base);
     let rest = rest_weights(table, robot, &base);
-    let position = (closeness * before).powi(-2);
+    let position = real::powi(closeness * before, -2);
     let end = [END * position, END * END * position];
     let mut multipliers = [0.0; 3];
     let mut corrections = vec![[0.0; 2]; last];
@@ -59,19 +60,19 @@ pub(super) fn correct(table: &mut CommandTable, robot: &RobotModel, closeness: f
         }
         off = replayed(table, start);
         let miss = off[last];
-        if miss[0].hypot(miss[1]) <= EXACT[0] && miss[2].abs() <= EXACT[1] {
+        if real::hypot(miss[0], miss[1]) <= EXACT[0] && miss[2].abs() <= EXACT[1] {
             break;
         }
         (0..3).for_each(|i| multipliers[i] += end[usize::from(i == 2)] * miss[i]);
     }
     let [x, y, heading] = off[last];
-    let promised = x.hypot(y) <= PROMISED[0] && heading.abs() <= PROMISED[1];
+    let promised = real::hypot(x, y) <= PROMISED[0] && heading.abs() <= PROMISED[1];
     promised.then(|| farthest(&off) / before)
 }
 
 /// The largest distance of positions that are off, m.
 fn farthest(off: &[[f64; 3]]) -> f64 {
-    off.iter().map(|[x, y, _]| x.hypot(*y)).fold(0.0, f64::max)
+    off.iter().map(|[x, y, _]| real::hypot(*x, *y)).fold(0.0, f64::max)
 }
 
 /// Rim speeds of a row, m/s.
@@ -94,7 +95,7 @@ fn linearise(table: &CommandTable, off: &[[f64; 3]], corrections: &[[f64; 2]], r
     for (k, row) in rows.iter_mut().enumerate() {
         let (v, omega) = table.twist(k);
         let half_turn = 0.5 * omega * hold;
-        let (sin, cos) = (table.rows[k].pose.yaw + off[k][2] + half_turn).sin_cos();
+        let (sin, cos) = real::sin_cos(table.rows[k].pose.yaw + off[k][2] + half_turn);
         let chord = v * hold * sinc(half_turn);
         row.by_heading = [-chord * sin, chord * cos];
         let along = 0.5 * hold * sinc(half_turn);
@@ -126,7 +127,7 @@ fn weights(table: &CommandTable, robot: &RobotModel, base: &[[f64; 2]]) -> Vec<R
     }
     for (row, [left, right]) in rows.iter_mut().zip(base) {
         let least = LEAST_ROOM * LEAST_ROOM * limits[0];
-        let of = |speed: f64| (SHARE * speed.abs() + least).powi(-2);
+        let of = |speed: f64| real::powi(SHARE * speed.abs() + least, -2);
         row.twist = [of(0.5 * (left + right)), of(left.abs().max(right.abs()))];
     }
     rows
@@ -149,12 +150,12 @@ fn bounds(limits: &MotionLimits, table: &CommandTable, base: &[[f64; 2]]) -> [f6
     let own = [limits.speed, limits.acceleration, limits.jerk];
     [0, 1, 2].map(|order| {
         let limit = own[order].unwrap_or(2.0 * peaks[0][order].max(peaks[1][order]));
-        limit.max(f64::MIN_POSITIVE) * hold.powi(order as i32)
+        limit.max(f64::MIN_POSITIVE) * real::powi(hold, order as i32)
     })
 }
 
 /// One over the square of the room between a value and its limit on both sides.
 fn weight(value: f64, limit: f64) -> f64 {
     let room = |side: f64| (limit - side * value).max(LEAST_ROOM * limit);
-    0.5 * (room(1.0).powi(-2) + room(-1.0).powi(-2))
+    0.5 * (real::powi(room(1.0), -2) + real::powi(room(-1.0), -2))
 }

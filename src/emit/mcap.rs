@@ -16,6 +16,7 @@ use super::{cdr, number, ros};
 use crate::command::{CommandRow, CommandTable};
 use crate::diag::{Describe, Diagnostic};
 use crate::geom::Pose2;
+use crate::math::real;
 use crate::robot::RobotModel;
 use ros::{MessageType, Offer};
 
@@ -272,7 +273,7 @@ fn time(w: &mut cdr::Writer, nanoseconds: u64) {
 
 /// A turn about z as a quaternion x, y, z, w. Continuous in `yaw`, so that receivers interpolate the short way.
 fn heading(w: &mut cdr::Writer, yaw: f64) {
-    let (sin, cos) = (0.5 * yaw).sin_cos();
+    let (sin, cos) = real::sin_cos(0.5 * yaw);
     w.f64_array(&[0.0, 0.0, sin, cos]);
 }
 

@@ -3,6 +3,7 @@
 use super::csv::CsvHeader;
 use crate::command::{CommandRow, CommandTable};
 use crate::geom::Pose2;
+use crate::math::real;
 use crate::mission::Sampling;
 
 /// A drive on a bend, with headings beyond pi, that ends at rest; joints move if there are any.
@@ -15,11 +16,11 @@ pub fn table(rows: usize, joints: &[(&str, bool)]) -> CommandTable {
         joints: joints.iter().map(|(name, prismatic)| ((*name).to_string(), *prismatic)).collect(),
         rows: Vec::new(),
     };
-    let position = |k: usize, j: usize| 0.3 + 0.01 * (j + 1) as f64 * (k.min(rows - 1) as f64 * 0.1).sin();
+    let position = |k: usize, j: usize| 0.3 + 0.01 * (j + 1) as f64 * real::sin(k.min(rows - 1) as f64 * 0.1);
     let mut pose = Pose2::new(0.5, -1.25, 3.0);
     for k in 0..rows {
         let last = k + 1 == rows;
-        let speed = if last { 0.0 } else { 4.0 * (0.3 + k as f64 * 0.07).sin().abs() };
+        let speed = if last { 0.0 } else { 4.0 * real::sin(0.3 + k as f64 * 0.07).abs() };
         table.rows.push(CommandRow {
             wheel_left: 0.9 * speed,
             wheel_right: 1.1 * speed,

@@ -1,6 +1,7 @@
 //! Trilinear interpolation of value and gradient, and what holds beyond the grid.
 
 use super::Esdf;
+use crate::math::real;
 use crate::mission::Unknown;
 
 /// The cell that holds a point, and where in it; and how far outside the grid the point lies, m.
@@ -146,7 +147,7 @@ impl Esdf {
                 gradient[a] = 0.0;
             }
         }
-        let sideways = beyond[0].hypot(beyond[1]);
+        let sideways = real::hypot(beyond[0], beyond[1]);
         if self.outside == Unknown::Occupied && sideways > 0.0 {
             return (-sideways, [-beyond[0] / sideways, -beyond[1] / sideways, 0.0]);
         }
@@ -159,7 +160,7 @@ impl Esdf {
             }
             return (value + away, gradient);
         }
-        let distance = value.hypot(away);
+        let distance = real::hypot(value, away);
         for a in 0..3 {
             gradient[a] = (value * gradient[a] + beyond[a]) / distance;
         }

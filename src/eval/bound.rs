@@ -1,6 +1,7 @@
 //! A travel time that no plan can beat, obstacles and jerk left out.
 
 use crate::geom::{Pose2, wrap_angle};
+use crate::math::real;
 use crate::robot::BaseLimits;
 
 /// Step of the integral, s.
@@ -16,7 +17,7 @@ const TOLERANCE: f64 = 1e-3;
 /// count the angle from the other end of the robot.
 pub fn travel_time(start: Pose2, goal: Pose2, limits: &BaseLimits, reverse: bool) -> f64 {
     let distance = start.distance(goal);
-    let line = (goal.y - start.y).atan2(goal.x - start.x);
+    let line = real::atan2(goal.y - start.y, goal.x - start.x);
     let off = |yaw: f64| {
         let angle = wrap_angle(yaw - line).abs();
         if reverse { angle.min(std::f64::consts::PI - angle) } else { angle }
@@ -27,7 +28,7 @@ pub fn travel_time(start: Pose2, goal: Pose2, limits: &BaseLimits, reverse: bool
     let (off_start, off_goal) = (off(start.yaw), off(goal.yaw));
     let toward = |off: f64, t: f64| {
         let turned = (0.5 * limits.angular_acceleration * t * t).min(limits.angular_speed * t);
-        (off - turned).max(0.0).cos().max(0.0)
+        real::cos((off - turned).max(0.0)).max(0.0)
     };
     let progress = |time: f64| -> f64 {
         let steps = (time / STEP).ceil().max(1.0);

@@ -11,6 +11,7 @@ use super::Suite;
 use super::fixed::{self, Fixed};
 use super::rng::Rng;
 use super::room::Room;
+use crate::math::real;
 
 /// Cell size, m; all faces lie on this grid.
 pub(super) const CELL: f64 = 0.05;
@@ -233,7 +234,7 @@ fn poses(rng: &mut Rng, recipe: &Recipe, boxes: &[CellBox]) -> Option<[[f64; 3];
         };
         let (start, goal) = (pose(), pose());
         let [from, to] = [start, goal].map(|p| [p[0], p[1]]);
-        let far = (to[0] - from[0]).hypot(to[1] - from[1]) > recipe.distance;
+        let far = real::hypot(to[0] - from[0], to[1] - from[1]) > recipe.distance;
         let free = far && [from, to].iter().all(|p| all.clearance(*p) >= recipe.free);
         (free && below.connected(from, to, recipe.passage)).then_some([start, goal])
     })
@@ -254,7 +255,7 @@ mod tests {
 
     fn gap(b: &Aabb, x: f64, y: f64) -> f64 {
         let axis = |a: usize, p: f64| (b.min[a] - p).max(p - b.max[a]).max(0.0);
-        axis(0, x).hypot(axis(1, y))
+        real::hypot(axis(0, x), axis(1, y))
     }
 
     #[test]
@@ -276,7 +277,7 @@ mod tests {
         {
             for scene in set(suite, default_boxes(suite), 8, 11).scenes {
                 let ends = [&scene.start, &scene.goal].map(|p| (p.x.expect("given"), p.y.expect("given")));
-                assert!((ends[0].0 - ends[1].0).hypot(ends[0].1 - ends[1].1) > distance, "{}", scene.id);
+                assert!(real::hypot(ends[0].0 - ends[1].0, ends[0].1 - ends[1].1) > distance, "{}", scene.id);
                 for (x, y) in ends {
                     let wall = x.min(y).min(10.0 - x).min(10.0 - y);
                     assert!(scene.boxes.iter().map(|b| gap(b, x, y)).fold(wall, f64::min) >= free, "{}", scene.id);

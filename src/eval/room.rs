@@ -1,6 +1,7 @@
 //! Where a disc fits between boxes in a square room, seen from above.
 
 use super::generate::{CELL, CellBox, SIDE};
+use crate::math::real;
 
 /// A square room with the boxes that matter at some height.
 pub(super) struct Room<'a> {
@@ -21,7 +22,7 @@ impl<'a> Room<'a> {
             let (low, high) = (f64::from(low) * CELL, f64::from(high) * CELL);
             (low - at).max(at - high).max(0.0)
         };
-        let nearest = self.boxes.iter().map(|b| gap(b.min[0], b.max[0], x).hypot(gap(b.min[1], b.max[1], y)));
+        let nearest = self.boxes.iter().map(|b| real::hypot(gap(b.min[0], b.max[0], x), gap(b.min[1], b.max[1], y)));
         nearest.fold(wall, f64::min)
     }
 

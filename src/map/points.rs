@@ -163,6 +163,7 @@ pub(super) fn quote(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::real;
 
     #[test]
     fn every_scalar_reads_what_was_written_in_both_byte_orders() {
@@ -173,8 +174,8 @@ mod tests {
             (Scalar::U16, 65000u16.to_le_bytes().into(), 65000.0),
             (Scalar::I32, (-70000i32).to_le_bytes().into(), -70000.0),
             (Scalar::U32, 4_000_000_000u32.to_le_bytes().into(), 4e9),
-            (Scalar::I64, (-1i64 << 40).to_le_bytes().into(), -(2f64.powi(40))),
-            (Scalar::U64, (1u64 << 63).to_le_bytes().into(), 2f64.powi(63)),
+            (Scalar::I64, (-1i64 << 40).to_le_bytes().into(), -(real::powi(2.0, 40))),
+            (Scalar::U64, (1u64 << 63).to_le_bytes().into(), real::powi(2.0, 63)),
             (Scalar::F32, 1.5f32.to_le_bytes().into(), 1.5),
             (Scalar::F64, (-0.1f64).to_le_bytes().into(), -0.1),
         ];

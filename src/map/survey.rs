@@ -7,6 +7,7 @@ use super::points::Points;
 use super::voxelize::Slab;
 use super::{FARTHEST, MapInputs, ending, in_file, las, npy, octomap, pcd, ply, text};
 use crate::diag::Diagnostics;
+use crate::math::real;
 
 /// Rows of the table of heights.
 const BINS: usize = 12;
@@ -47,7 +48,7 @@ pub struct Floor {
 impl Floor {
     /// Angle between the plane and the horizontal, rad.
     pub fn tilt(&self) -> f64 {
-        self.slope[0].hypot(self.slope[1]).atan()
+        real::atan(real::hypot(self.slope[0], self.slope[1]))
     }
 }
 
@@ -183,7 +184,7 @@ mod tests {
     #[test]
     fn a_tilted_floor_is_found_below_what_stands_on_it() {
         // 1.35 degrees along x; a wall across, whose foot is on the floor, and a pit.
-        let slope = 1.35f64.to_radians().tan();
+        let slope = real::tan(1.35f64.to_radians());
         let mut points = ground(|x, y| if x < 2.0 && y < 3.0 { -1.0 } else { slope * x - 0.3 });
         points.extend((0..1000).map(|k| [5.0, (k % 100) as f64 * 0.1, f64::from(k / 100) * 0.2 + 0.1]));
         let survey = of(&Points::List(points)).expect("points");

@@ -5,6 +5,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::occupancy::Seen;
+use crate::math::real;
 
 /// Overlaps below this part of a cell are rounding.
 const TOUCH: f64 = 1e-6;
@@ -34,7 +35,7 @@ pub(super) fn turn(sheet: Sheet, yaw: f64) -> (Sheet, [f64; 2]) {
 
 /// Width and height of the turned cells, in cells, to see beforehand whether they can be handled.
 pub(super) fn size(width: usize, height: usize, yaw: f64) -> [i64; 2] {
-    let (sin, cos) = yaw.sin_cos();
+    let (sin, cos) = real::sin_cos(yaw);
     let along = |a: f64, b: f64| (width as f64 * a.abs() + height as f64 * b.abs()).ceil() as i64 + 1;
     [along(cos, sin), along(sin, cos)]
 }
@@ -47,7 +48,7 @@ fn quarter(sheet: &Sheet) -> Sheet {
 }
 
 fn askew(sheet: &Sheet, yaw: f64) -> (Sheet, [f64; 2]) {
-    let (sin, cos) = yaw.sin_cos();
+    let (sin, cos) = real::sin_cos(yaw);
     let (w, h) = (sheet.width as f64, sheet.height as f64);
     let turned = |x: f64, y: f64| [cos * x - sin * y, sin * x + cos * y];
     let corners = [turned(0.0, 0.0), turned(w, 0.0), turned(0.0, h), turned(w, h)];
@@ -116,7 +117,7 @@ mod tests {
             width in 1usize..7, height in 1usize..7, codes in prop::collection::vec(any::<u8>(), 1..40), yaw in -7.0..7.0f64,
             points in prop::collection::vec((0.001..0.999f64, 0.001..0.999f64), 20),
         ) {
-            let (sin, cos) = yaw.sin_cos();
+            let (sin, cos) = real::sin_cos(yaw);
             let before = sheet(width, height, &codes);
             let (after, corner) = turn(sheet(width, height, &codes), yaw);
             let [most_x, most_y] = size(width, height, yaw);
@@ -142,7 +143,7 @@ mod tests {
                 before.cells.iter().enumerate().filter(|(_, s)| **s == Seen::Occupied).map(|p| solid(&p)).collect();
             for (at, _) in after.cells.iter().enumerate().filter(|(_, s)| **s == Seen::Occupied) {
                 let [x, y] = [(at % after.width) as f64 + 0.5, (at / after.width) as f64 + 0.5];
-                prop_assert!(solids.iter().any(|s| (s[0] - x).hypot(s[1] - y) < 2f64.sqrt()));
+                prop_assert!(solids.iter().any(|s| real::hypot(s[0] - x, s[1] - y) < 2f64.sqrt()));
             }
         }
     }

@@ -4,6 +4,7 @@ use super::error::MapError;
 use super::npy::Voxels;
 use super::points::Points;
 use super::{FARTHEST, MapStatistics, VoxelMap};
+use crate::math::real;
 use crate::memory;
 use crate::mission::Unknown;
 
@@ -51,7 +52,7 @@ pub(super) fn checked(cells: [i64; 3], resolution: f64) -> Result<[usize; 3], Ma
     // The next coarser cell of two digits that would do: 0.05, 0.06, 0.07, 0.08, 0.09, 0.1, 0.2, ...
     let mut enough = resolution;
     for _ in 0..1000 {
-        let digit = 10f64.powf(enough.log10().floor());
+        let digit = real::powf(10.0, real::log10(enough).floor());
         enough = ((enough / digit + 1e-6).floor() + 1.0) * digit;
         if fits(cells.map(|n| (n as f64 * resolution / enough).ceil() as u128 + 1)) {
             break;

@@ -222,6 +222,7 @@ fn nearest_on_triangle(points: &[Vector3<f64>; 4], [i, j, k]: [usize; 3]) -> (Ke
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::real;
     use nalgebra::{Isometry3, Point3, UnitQuaternion};
     use parry3d_f64::query;
     use parry3d_f64::shape::{Ball, Cuboid};
@@ -240,7 +241,7 @@ mod tests {
                 Self::Box { half } => Vector3::new(half[0].copysign(d.x), half[1].copysign(d.y), half[2].copysign(d.z)),
                 Self::Sphere { radius } => d.normalize() * *radius,
                 Self::Cylinder { radius, half_length } => {
-                    let flat = d.x.hypot(d.y).max(1e-300);
+                    let flat = real::hypot(d.x, d.y).max(1e-300);
                     Vector3::new(d.x / flat * radius, d.y / flat * radius, half_length.copysign(d.z))
                 }
             }
@@ -321,7 +322,7 @@ mod tests {
             let inside = |pose: &Isometry3<f64>, p: Vector3<f64>| pose.inverse_transform_point(&p.into());
             let (on_a, on_b) = (inside(&pose_a, first), inside(&pose_b, first - apart));
             prop_assert!((0..3).all(|k| on_a[k].abs() <= half[k] + 1e-7));
-            prop_assert!(on_b.x.hypot(on_b.y) <= radius + 1e-7 && on_b.z.abs() <= 0.2 + 1e-7);
+            prop_assert!(real::hypot(on_b.x, on_b.y) <= radius + 1e-7 && on_b.z.abs() <= 0.2 + 1e-7);
             prop_assert!((apart.norm() - gap.upper).abs() < 1e-9);
         }
     }

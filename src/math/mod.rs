@@ -12,5 +12,6 @@ pub(crate) mod noise;
 pub mod pentadiagonal;
 pub mod poly;
 pub mod quadrature;
+pub mod real;
 pub mod smooth;
 pub mod spline;

@@ -11,6 +11,7 @@ use super::{
 use crate::diag::shape::Field;
 use crate::diag::yaml::{Entry, Node};
 use crate::diag::{Diagnostic, Diagnostics, Source, Span, shape, yaml};
+use crate::math::real;
 
 /// What a mission must hold at least, for the message about an empty one.
 const OUTLINE: &str = "`robot`, and either `map`, `start` and `goal`, or a given `path`";
@@ -300,7 +301,7 @@ impl Between<'_> {
                 continue;
             };
             if let Some(end) = last_end {
-                let gap = (points[0][0] - end[0]).hypot(points[0][1] - end[1]);
+                let gap = real::hypot(points[0][0] - end[0], points[0][1] - end[1]);
                 if gap > JOIN_TOLERANCE {
                     let message = format!(
                         "`path.bezier[{i}]` begins {} m away from where the segment before it ends: [{}, {}], not [{}, {}]",

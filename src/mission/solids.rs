@@ -7,6 +7,7 @@ use crate::diag::shape::{Field, Shape};
 use crate::diag::yaml::Node;
 use crate::diag::{Diagnostic, Source, Span};
 use crate::geom::Aabb;
+use crate::math::real;
 
 /// Thinner than this is a slip of the pen, m.
 const THINNEST: f64 = 1e-3;
@@ -140,7 +141,7 @@ pub(super) fn has_an_area(polygon: &[[f64; 2]]) -> bool {
     let next = polygon.iter().cycle().skip(1);
     let widths = polygon.iter().zip(next).filter_map(|(a, b)| {
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
-        let length = dx.hypot(dy);
+        let length = real::hypot(dx, dy);
         let off = polygon.iter().map(|p| ((p[1] - a[1]) * dx - (p[0] - a[0]) * dy) / length);
         let (low, high) = off.fold((0.0f64, 0.0f64), |(low, high), d| (low.min(d), high.max(d)));
         (length > 0.0).then_some(high - low)

@@ -1,6 +1,7 @@
 //! Powers of normalised time and their derivatives at fixed sample times: the same table serves every piece.
 
 use super::minco::TERMS;
+use crate::math::real;
 
 /// Monomials at one normalised time: `rows[order][power]` is d^order/du^order of u^power.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,7 +21,7 @@ impl Basis {
         for (order, row) in rows.iter_mut().enumerate() {
             for (power, value) in row.iter_mut().enumerate().skip(order) {
                 let factor: f64 = (power + 1 - order..=power).map(|k| k as f64).product();
-                *value = factor * u.powi((power - order) as i32);
+                *value = factor * real::powi(u, (power - order) as i32);
             }
         }
         let columns = std::array::from_fn(|power| std::array::from_fn(|order| rows[order][power]));
@@ -71,7 +72,7 @@ mod tests {
             let at = |u: &[f64]| Basis::new(u[0]).derivative(&c, 1, 0, order - 1, 1.0);
             let numeric = crate::math::fd::numeric_gradient(at, &[0.37], 1e-3)[0];
             assert!((Basis::new(0.37).derivative(&c, 1, 0, order, 1.0) - numeric).abs() < 1e-9);
-            let scaled = Basis::new(0.37).derivative(&c, 1, 0, order, 0.7f64.powi(order as i32));
+            let scaled = Basis::new(0.37).derivative(&c, 1, 0, order, real::powi(0.7, order as i32));
             assert!((Basis::new(0.37).orders(&c, 1, 0, 0.7)[order] - scaled).abs() < 1e-12);
         }
     }

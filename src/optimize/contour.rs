@@ -9,6 +9,7 @@
 
 use nalgebra::{Isometry3, Point3};
 
+use crate::math::real;
 use crate::robot::{Convex, RobotModel, Shape};
 
 /// Points in a leaf of the tree.
@@ -302,7 +303,7 @@ fn disc_points(radius: f64, spacing: f64) -> Vec<[f64; 3]> {
 fn ring_points(radius: f64, z: f64, spacing: f64) -> impl Iterator<Item = [f64; 3]> {
     let n = steps(std::f64::consts::TAU * radius, spacing).max(8);
     (0..n).map(move |i| {
-        let (s, c) = (std::f64::consts::TAU * i as f64 / n as f64).sin_cos();
+        let (s, c) = real::sin_cos(std::f64::consts::TAU * i as f64 / n as f64);
         [radius * c, radius * s, z]
     })
 }
@@ -349,7 +350,7 @@ fn directions(count: usize) -> impl Iterator<Item = nalgebra::Vector3<f64>> {
     (0..count).map(move |i| {
         let z = 1.0 - (2 * i + 1) as f64 / count as f64;
         let flat = (1.0 - z * z).sqrt();
-        let (s, c) = (golden * i as f64).sin_cos();
+        let (s, c) = real::sin_cos(golden * i as f64);
         nalgebra::Vector3::new(flat * c, flat * s, z)
     })
 }
@@ -367,7 +368,7 @@ fn hull_points(convex: &Convex, vertices: &[[f64; 3]], spacing: f64) -> Vec<[f64
     // Enough to bridge every edge of a plain hull; a finely meshed one has its vertices for that.
     let nearest = if vertices.len() <= 24 { vertices.len() } else { 12 };
     for (i, a) in vertices.iter().enumerate() {
-        let apart = |b: &[f64; 3]| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>();
+        let apart = |b: &[f64; 3]| (0..3).map(|k| real::powi(a[k] - b[k], 2)).sum::<f64>();
         let mut others: Vec<_> = vertices.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, b)| b).collect();
         others.sort_by(|b, c| apart(b).total_cmp(&apart(c)));
         for b in others.into_iter().take(nearest) {
@@ -413,7 +414,10 @@ mod tests {
     use super::*;
 
     fn nearest(points: &[[f64; 3]], p: [f64; 3]) -> f64 {
-        points.iter().map(|q| (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt()).fold(f64::INFINITY, f64::min)
+        points
+            .iter()
+            .map(|q| (0..3).map(|k| real::powi(p[k] - q[k], 2)).sum::<f64>().sqrt())
+            .fold(f64::INFINITY, f64::min)
     }
 
     #[test]
@@ -436,7 +440,7 @@ mod tests {
     fn every_point_of_a_cylinder_rim_is_near_a_contour_point() {
         let points = cylinder_points(0.08, 0.02, 0.05);
         for i in 0..360 {
-            let (s, c) = (i as f64).to_radians().sin_cos();
+            let (s, c) = real::sin_cos((i as f64).to_radians());
             for z in [-0.02, 0.02] {
                 assert!(nearest(&points, [0.08 * c, 0.08 * s, z]) < 0.026);
             }
@@ -495,7 +499,7 @@ mod tests {
             }
             // The rim is within half a spacing, the inside within twice that of a corner of a square.
             for k in 0..720 {
-                let (s, c) = (k as f64).to_radians().sin_cos();
+                let (s, c) = real::sin_cos((k as f64).to_radians());
                 let (rim, within) = match shape.convex {
                     Convex::Cylinder { radius, .. } => ([radius * c, radius * s], [0.4 * radius * c, 0.4 * radius * s]),
                     _ => ([0.21, 0.17 * s], [0.15 * c, 0.12 * s]),
@@ -526,9 +530,10 @@ mod tests {
             };
             let place = |u: f64, v: f64| {
                 let at = match &shape.convex {
-                    Convex::Cylinder { radius, .. } => {
-                        [radius * u * (std::f64::consts::PI * v).cos(), radius * u * (std::f64::consts::PI * v).sin()]
-                    }
+                    Convex::Cylinder { radius, .. } => [
+                        radius * u * real::cos(std::f64::consts::PI * v),
+                        radius * u * real::sin(std::f64::consts::PI * v),
+                    ],
                     Convex::Box { half } => [u * half[0], v * half[1]],
                     other => panic!("{other:?}"),
                 };
@@ -549,7 +554,7 @@ mod tests {
                         let q = shape.pose.inverse_transform_point(&p);
                         let inside = match &shape.convex {
                             Convex::Cylinder { radius, half_length } => {
-                                q.x.hypot(q.y).max(q.z.abs() + radius - half_length) <= radius + 1e-9
+                                real::hypot(q.x, q.y).max(q.z.abs() + radius - half_length) <= radius + 1e-9
                             }
                             Convex::Box { half } => (0..3).all(|k| q[k].abs() <= half[k] + 1e-9),
                             other => panic!("{other:?}"),

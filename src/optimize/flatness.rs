@@ -1,5 +1,7 @@
 //! From the flat output to the base's speeds and accelerations, \[SCR\] Eq. 3, forwards and backwards.
 
+use crate::math::real;
+
 /// Speeds below this are treated as this, m/s: the flat output has no heading at rest.
 const SPEED_FLOOR: f64 = 1e-6;
 
@@ -21,7 +23,7 @@ pub struct BaseMotion {
 /// # Deviation
 /// The last factor of Eq. 3d and Eq. 16 is misprinted; `x'x'' + y'y''` is used, which is the derivative of Eq. 3c.
 pub fn base_motion(d1: [f64; 2], d2: [f64; 2], d3: [f64; 2]) -> BaseMotion {
-    let v = d1[0].hypot(d1[1]).max(SPEED_FLOOR);
+    let v = real::hypot(d1[0], d1[1]).max(SPEED_FLOOR);
     let v2 = v * v;
     let a = (d1[0] * d2[0] + d1[1] * d2[1]) / v;
     let omega = (d1[0] * d2[1] - d1[1] * d2[0]) / v2;
@@ -68,11 +70,11 @@ mod tests {
     fn a_circle_has_its_turn_rate_and_no_accelerations() {
         // (cos wt, sin wt) r at t = 0.3.
         let (r, w, t) = (0.7f64, 1.3f64, 0.3f64);
-        let (s, c) = (w * t).sin_cos();
+        let (s, c) = real::sin_cos(w * t);
         let m = base_motion(
             [-r * w * s, r * w * c],
             [-r * w * w * c, -r * w * w * s],
-            [r * w.powi(3) * s, -r * w.powi(3) * c],
+            [r * real::powi(w, 3) * s, -r * real::powi(w, 3) * c],
         );
         assert!((m.v - r * w).abs() < 1e-12 && (m.omega - w).abs() < 1e-12);
         assert!(m.a.abs() < 1e-12 && m.alpha.abs() < 1e-12);
@@ -92,7 +94,7 @@ mod tests {
     proptest! {
         #[test]
         fn gradients_match_finite_differences(x in proptest::array::uniform6(-1.0..1.0f64), by in proptest::array::uniform4(-1.0..1.0f64)) {
-            prop_assume!(x[0].hypot(x[1]) > 0.2);
+            prop_assume!(real::hypot(x[0], x[1]) > 0.2);
             let by = BaseMotion { v: by[0], a: by[1], omega: by[2], alpha: by[3] };
             let split = |x: &[f64]| ([x[0], x[1]], [x[2], x[3]], [x[4], x[5]]);
             let f = |x: &[f64]| {

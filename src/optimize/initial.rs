@@ -4,6 +4,7 @@ use super::options::OptimizeOptions;
 use super::penalty::Limits;
 use super::sections::{CORNER_SHARE, DriveSection};
 use super::{minco::ORDERS, time_map};
+use crate::math::real;
 use crate::search::SearchPath;
 
 /// Bends smaller than this are straight, rad.
@@ -131,7 +132,7 @@ pub(crate) fn guess(path: &SearchPath, section: &DriveSection, limits: &Limits, 
         z[1] = state.pose.y;
         z[2..m].copy_from_slice(&state.joints);
         // [SCR] section V-C: the least speed along the heading, no higher derivative.
-        let (sin, cos) = state.pose.yaw.sin_cos();
+        let (sin, cos) = real::sin_cos(state.pose.yaw);
         z[m] = side * limits.min_speed * cos;
         z[m + 1] = side * limits.min_speed * sin;
         z
@@ -277,7 +278,7 @@ fn durations(line: &Line<'_>, breaks: &[Break], limits: &Limits) -> Vec<f64> {
     let pieces = breaks.len() - 1;
     let gap = |i: usize| {
         let (a, b) = (breaks[i].position, breaks[i + 1].position);
-        (a[0] - b[0]).hypot(a[1] - b[1]).max(1e-3)
+        real::hypot(a[0] - b[0], a[1] - b[1]).max(1e-3)
     };
     let cap: Vec<f64> = (0..pieces)
         .map(|i| {

@@ -12,6 +12,7 @@ use super::time_map;
 use crate::geom::unwrap_near;
 use crate::math::lbfgs::{Lbfgs, Stop};
 use crate::math::poly::{Piece, PiecewisePoly};
+use crate::math::real;
 use crate::robot::RobotModel;
 use crate::search::{SearchMove, SearchPath};
 use crate::trajectory::{DriveLeg, Ending};
@@ -194,7 +195,8 @@ pub(crate) fn heading_at_end(leg: &DriveLeg, per_piece: usize) -> Option<f64> {
     for piece in &leg.curve.pieces {
         for k in 0..=per_piece {
             let t = piece.duration * k as f64 / per_piece as f64;
-            let next = unwrap_near((side * piece.derivative(1, 1, t)).atan2(side * piece.derivative(0, 1, t)), yaw);
+            let next =
+                unwrap_near(real::atan2(side * piece.derivative(1, 1, t), side * piece.derivative(0, 1, t)), yaw);
             let turn = (next - yaw).abs();
             if turn.is_nan() || turn > 0.8 {
                 return None;
@@ -216,7 +218,7 @@ fn real_time(curve: &Minco) -> PiecewisePoly {
             let coefficients = (0..m)
                 .map(|d| {
                     (0..TERMS)
-                        .map(|k| curve.coefficients()[(piece * TERMS + k) * m + d] / duration.powi(k as i32))
+                        .map(|k| curve.coefficients()[(piece * TERMS + k) * m + d] / real::powi(duration, k as i32))
                         .collect()
                 })
                 .collect();

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::math::fd::{numeric_gradient, relative_error};
+use crate::math::real;
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 
@@ -11,10 +12,10 @@ fn derivative(curve: &Minco, piece: usize, d: usize, order: usize, u: f64) -> f6
     (order..TERMS)
         .map(|k| {
             let factor: f64 = (k + 1 - order..=k).map(|i| i as f64).product();
-            factor * curve.coefficients[(piece * TERMS + k) * m + d] * u.powi((k - order) as i32)
+            factor * curve.coefficients[(piece * TERMS + k) * m + d] * real::powi(u, (k - order) as i32)
         })
         .sum::<f64>()
-        / t.powi(order as i32)
+        / real::powi(t, order as i32)
 }
 
 /// Normalised coefficients of one dimension by the full system.
@@ -26,17 +27,17 @@ fn by_the_full_system(start: &[f64], end: &[f64], waypoints: &[f64], durations: 
     let factorial = [1.0, 1.0, 2.0, 6.0];
     for d in 0..4 {
         a[(row, d)] = 1.0;
-        b[row] = start[d] * durations[0].powi(d as i32) / factorial[d];
+        b[row] = start[d] * real::powi(durations[0], d as i32) / factorial[d];
         row += 1;
     }
     for i in 0..pieces - 1 {
         let ratio = durations[i] / durations[i + 1];
         let mut continuity = |row: usize, d: usize| {
-            let scale = ratio.powi(-(d as i32)).min(1.0);
+            let scale = real::powi(ratio, -(d as i32)).min(1.0);
             for k in d..8 {
                 a[(row, 8 * i + k)] = scale * choose(k, d);
             }
-            a[(row, 8 * i + 8 + d)] = -scale * ratio.powi(d as i32);
+            a[(row, 8 * i + 8 + d)] = -scale * real::powi(ratio, d as i32);
         };
         for (offset, d) in [4, 5, 6, 0, 1, 2, 3].into_iter().enumerate() {
             continuity(row + if offset < 3 { offset } else { offset + 1 }, d);
@@ -51,7 +52,7 @@ fn by_the_full_system(start: &[f64], end: &[f64], waypoints: &[f64], durations: 
         for k in d..8 {
             a[(row, n - 8 + k)] = choose(k, d);
         }
-        b[row] = end[d] * durations[pieces - 1].powi(d as i32) / factorial[d];
+        b[row] = end[d] * real::powi(durations[pieces - 1], d as i32) / factorial[d];
         row += 1;
     }
     a.full_piv_lu().solve(&b).expect("the system is regular").as_slice().to_vec()
@@ -89,7 +90,7 @@ fn cases(longest_ratio: f64) -> impl Strategy<Value = Case> {
                 start,
                 end,
                 waypoints,
-                durations: spread.iter().map(|s| least * longest_ratio.powf(*s)).collect(),
+                durations: spread.iter().map(|s| least * real::powf(longest_ratio, *s)).collect(),
             })
     })
 }
@@ -123,7 +124,7 @@ proptest! {
                     let before = derivative(&curve, piece - 1, d, order, 1.0);
                     let after = derivative(&curve, piece, d, order, 0.0);
                     // Scale: the size of that derivative's terms on the shorter neighbour.
-                    let t = curve.durations[piece].min(curve.durations[piece - 1]).powi(order as i32);
+                    let t = real::powi(curve.durations[piece].min(curve.durations[piece - 1]), order as i32);
                     let scale = 5040.0 * (0..TERMS * 2).map(|k| {
                         curve.coefficients[((piece - 1) * TERMS + k) * case.dimensions + d].abs()
                     }).fold(1.0, f64::max) / t;

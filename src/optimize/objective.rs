@@ -11,6 +11,7 @@ use super::options::OptimizeOptions;
 use super::penalty::clearance::{ByPose, ClearancePenalty, DistanceField, Placement};
 use super::penalty::{Judge, Limits, Penalise, Worst, joint, speed, turn};
 use super::time_map;
+use crate::math::real;
 use crate::math::smooth::smooth_switch;
 use crate::robot::RobotModel;
 
@@ -345,7 +346,7 @@ impl<'a, F: DistanceField> Objective<'a, F> {
 /// Weights of the energy, such that it matters as much as time for a motion that speeds up within its limits: the natural
 /// fourth derivative of something with limits (v, a) is a^3/v^2.
 fn energy_weights(limits: &Limits, options: &OptimizeOptions) -> Vec<f64> {
-    let weight = |v: f64, a: f64| options.smoothness * (v * v / (a * a * a)).powi(2);
+    let weight = |v: f64, a: f64| options.smoothness * real::powi(v * v / (a * a * a), 2);
     let mut weights = vec![weight(limits.speed, limits.acceleration); 2];
     weights.extend(limits.joints.iter().map(|j| weight(j.speed, j.acceleration)));
     weights

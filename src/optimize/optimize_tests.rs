@@ -2,6 +2,7 @@ use super::leg::heading_at_end;
 use super::test_robot::{Boxes, robot};
 use super::*;
 use crate::geom::Pose2;
+use crate::math::real;
 use crate::search::{SearchMove, SearchState};
 
 /// A path from (turn, distance, joint) steps from the origin; negative distance: reverse.
@@ -12,7 +13,7 @@ pub(super) fn path(joints: usize, steps: &[(f64, f64, f64)]) -> SearchPath {
     for &(turn, distance, joint) in steps {
         let from = states.last().unwrap().clone();
         let yaw = from.pose.yaw + turn;
-        let pose = Pose2::new(from.pose.x + distance * yaw.cos(), from.pose.y + distance * yaw.sin(), yaw);
+        let pose = Pose2::new(from.pose.x + distance * real::cos(yaw), from.pose.y + distance * real::sin(yaw), yaw);
         states.push(SearchState { pose, joints: posture(joint) });
         moves.push(match distance {
             0.0 => SearchMove::Still,

@@ -2,6 +2,7 @@
 
 use super::options::OptimizeOptions;
 use super::penalty::Limits;
+use crate::math::real;
 use crate::search::{SearchMove, SearchPath, SearchState};
 use crate::trajectory::StillLeg;
 
@@ -66,7 +67,7 @@ impl Thresholds {
             return false;
         }
         let reach = self.reach.min(CORNER_SHARE * before.min(after));
-        let radius = reach / (0.5 * angle).tan().max(1e-6);
+        let radius = reach / real::tan(0.5 * angle).max(1e-6);
         // omega = v / R meets Eq. 14: v = R slope (v_max - v).
         let speed = radius * limits.turn_slope / (1.0 + radius * limits.turn_slope);
         speed > self.slowest
@@ -206,7 +207,8 @@ mod tests {
         for &(turn, distance, joint) in steps {
             let from = states.last().unwrap().clone();
             let yaw = from.pose.yaw + turn;
-            let pose = Pose2::new(from.pose.x + distance * yaw.cos(), from.pose.y + distance * yaw.sin(), yaw);
+            let pose =
+                Pose2::new(from.pose.x + distance * real::cos(yaw), from.pose.y + distance * real::sin(yaw), yaw);
             states.push(SearchState { pose, joints: vec![joint] });
             moves.push(match distance {
                 0.0 => SearchMove::Still,

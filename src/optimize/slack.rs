@@ -5,6 +5,7 @@
 //! counts. That is approximate; the certificate has the proof.
 
 use super::DistanceField;
+use crate::math::real;
 
 /// How far robots may be off when the base is at a place of a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,7 +29,7 @@ impl Slack {
 
     /// How far it may be off in any direction, or more, m.
     fn most(&self, p: [f64; 2]) -> f64 {
-        self.at(p).map(|s| s[0].hypot(s[1])).iter().sum::<f64>() + self.anywhere
+        self.at(p).map(|s| real::hypot(s[0], s[1])).iter().sum::<f64>() + self.anywhere
     }
 
     fn at(&self, p: [f64; 2]) -> [[f64; 2]; 4] {
@@ -66,7 +67,7 @@ impl Slacks {
     pub fn along(all: impl IntoIterator<Item = Slack>) -> Option<Self> {
         let mut slacks: Vec<Slack> = Vec::new();
         for slack in all {
-            let apart = |last: &Slack| (last.place[0] - slack.place[0]).hypot(last.place[1] - slack.place[1]);
+            let apart = |last: &Slack| real::hypot(last.place[0] - slack.place[0], last.place[1] - slack.place[1]);
             match slacks.last_mut().filter(|last| apart(last) < SAME) {
                 // The base turns there, or stands: the end of that counts, or what was more before.
                 Some(last) if last.most(last.place) > slack.most(last.place) => {}
@@ -90,7 +91,7 @@ impl Slacks {
                 let at = [low[0] + (i as f64 + 0.5) * cell, low[1] + (j as f64 + 0.5) * cell];
                 let mut least = f64::INFINITY;
                 for (distance, slack) in distances.iter_mut().zip(&slacks) {
-                    *distance = (at[0] - slack.place[0]).hypot(at[1] - slack.place[1]);
+                    *distance = real::hypot(at[0] - slack.place[0], at[1] - slack.place[1]);
                     least = least.min(*distance);
                 }
                 nearest.push(distances.iter().rposition(|d| *d <= least + ALIKE).unwrap_or(0) as u32);
@@ -109,7 +110,7 @@ impl Slacks {
     pub fn aside(&self, p: [f64; 2]) -> f64 {
         let slack = self.near(p);
         let away = [p[0] - slack.place[0], p[1] - slack.place[1]];
-        let distance = away[0].hypot(away[1]);
+        let distance = real::hypot(away[0], away[1]);
         if distance < self.cell {
             slack.along(slack.place, [0.0; 2])
         } else {

@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use super::penalty::clearance::DistanceField;
+use crate::math::real;
 use crate::robot::{
     BaseLimits, Body, BodyMotion, Convex, IgnoreReason, IgnoredPair, MotionLimits, MovingJoint, RobotModel, Shape,
 };
@@ -19,7 +20,7 @@ impl DistanceField for Balls {
     }
     fn distance_gradient(&self, p: [f64; 3]) -> (f64, [f64; 3]) {
         let (sum, gradient) = self.shares(p);
-        (-sum.ln() / SHARPNESS, gradient.map(|g| g / sum))
+        (-real::ln(sum) / SHARPNESS, gradient.map(|g| g / sum))
     }
     fn cell(&self) -> f64 {
         0.0
@@ -33,7 +34,7 @@ impl DistanceField for Balls {
             gradient[0] += x;
             gradient[1] += y;
         }
-        (-sum.ln() / SHARPNESS, gradient.map(|g| g / sum))
+        (-real::ln(sum) / SHARPNESS, gradient.map(|g| g / sum))
     }
 }
 
@@ -44,7 +45,7 @@ impl Balls {
         for (centre, radius) in &self.0 {
             let d: [f64; 3] = std::array::from_fn(|k| p[k] - centre[k]);
             let norm = d.iter().map(|v| v * v).sum::<f64>().sqrt().max(1e-9);
-            let share = (-SHARPNESS * (norm - radius)).exp();
+            let share = real::exp(-SHARPNESS * (norm - radius));
             sum += share;
             (0..3).for_each(|k| gradient[k] += share * d[k] / norm);
         }

@@ -6,6 +6,7 @@ use super::poses::Poses;
 use super::sink::{self, Sink, SinkError, Upcoming};
 use super::tracking::{Phase, Tracker};
 use crate::command::CommandTable;
+use crate::math::real;
 
 /// By how much the file's time may be off what joints were told before they are told anew, s.
 const ANEW: f64 = 0.1;
@@ -116,7 +117,7 @@ pub fn follow(
         ticks += 1;
         out.phase = command.phase;
         out.time = first.map_or(0.0, |first| now - first);
-        out.end = (command.error.along.hypot(command.error.across), command.error.heading.abs());
+        out.end = (real::hypot(command.error.along, command.error.across), command.error.heading.abs());
         if out.cut.is_some() || cut.is_some() || matches!(out.phase, Phase::Done | Phase::Stopped(_)) {
             out.cut = out.cut.or(cut);
             // Receivers that need frames get their zeros.

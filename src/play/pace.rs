@@ -8,6 +8,7 @@
 use super::motion::Motion;
 use crate::command::CommandRow;
 use crate::command::limits::{ROUNDING, differences};
+use crate::math::real;
 use crate::robot::{MotionLimits, RobotModel};
 
 /// Shapes of a change of pace that are tried: shares of its time in which its rate grows and falls off.
@@ -33,7 +34,7 @@ impl Limits {
             let peaks = differences((0..rows).map(|k| motion.speed(actuator, k)), hold);
             let given = limits.planning();
             [0, 1, 2].map(|order| {
-                (given[order] / radius).max(peaks[order]) * hold.powi(order as i32) * (1.0 + 0.5 * ROUNDING)
+                (given[order] / radius).max(peaks[order]) * real::powi(hold, order as i32) * (1.0 + 0.5 * ROUNDING)
             })
         };
         let wheels = [0, 1].map(|side| of(side, &robot.wheel, motion.table().wheel_radii.sides()[side]));
@@ -73,7 +74,7 @@ impl Slowing {
         let rate = 1.0 / (self.length - 0.5 * (up + down));
         let time = time.min(self.length);
         let first = time.min(up);
-        let mut driven = first - rate / up * first.powi(3) / 6.0;
+        let mut driven = first - rate / up * real::powi(first, 3) / 6.0;
         let pace = 1.0 - 0.5 * rate * up;
         if time > up {
             let t = time.min(self.length - down) - up;
@@ -82,7 +83,7 @@ impl Slowing {
         if time > self.length - down {
             // Seen from the end: the pace is rate/(2 down) (end - t)^2.
             let left = self.length - time;
-            driven += rate / down * (down.powi(3) - left.powi(3)) / 6.0;
+            driven += rate / down * (real::powi(down, 3) - real::powi(left, 3)) / 6.0;
         }
         driven
     }

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::command::CommandTable;
 use crate::math::poly::Piece;
+use crate::math::real;
 use crate::robot::RobotModel;
 use crate::search::{SearchMove, SearchPath, SearchState};
 use crate::trajectory::{Leg, StillLeg, Trajectory};
@@ -120,7 +121,7 @@ fn add_steered_instant(sum: &mut Integrals, piece: &Piece, u: f64, weight: f64) 
     let [speed, rise, jerk] = [1, 2, 3].map(|order| piece.derivative(1, order, u));
     sum.length += weight * speed.abs();
     // The third derivative of the position, along the heading and across it.
-    sum.jerk += weight * (jerk - speed * turn * turn).hypot(2.0 * rise * turn + speed * turn_rise);
+    sum.jerk += weight * real::hypot(jerk - speed * turn * turn, 2.0 * rise * turn + speed * turn_rise);
     sum.acceleration += weight * rise.abs();
     sum.angular_acceleration += weight * turn_rise.abs();
     sum.joint_jerk += weight * norm((2..piece.coefficients.len()).map(|d| piece.derivative(d, 3, u)));

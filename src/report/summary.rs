@@ -6,6 +6,7 @@ use std::fmt::Write;
 
 use super::schema::{CertificatePart, LimitPart, Report, RobotPart, Status, TolerancePart, TrustPart, ZonePart};
 use crate::certify::{END_ANGLE_TOLERANCE, END_POINT_TOLERANCE};
+use crate::math::real;
 pub use limits::table as limits_table;
 
 /// What a summary says beside the report.
@@ -359,7 +360,7 @@ fn significant(value: f64, digits: i32) -> String {
     if value == 0.0 || !value.is_finite() {
         return if value == 0.0 { "0".into() } else { "?".into() };
     }
-    let places = (digits - 1 - value.abs().log10().floor() as i32).clamp(0, 6) as usize;
+    let places = (digits - 1 - real::log10(value.abs()).floor() as i32).clamp(0, 6) as usize;
     let text = format!("{value:.places$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     if text.trim_start_matches('-') == "0" { "0".into() } else { text.to_string() }

@@ -1,6 +1,7 @@
 //! The convolution profile of \[CONV\] section 2: from rest to rest under speed, acceleration and jerk, in closed form.
 
 use crate::math::quadrature::gauss_legendre;
+use crate::math::real;
 
 /// A box shorter than this share of the whole duration is left out: it cannot be told from none.
 const LEAST_BOX: f64 = 1e-12;
@@ -27,13 +28,13 @@ impl Convolution {
         let a_reached = a.min((v * j).sqrt());
         let boxes = if distance >= v * (v / a_reached + a_reached / j) {
             [distance / v, v / a_reached, a_reached / j]
-        } else if distance >= 2.0 * a.powi(3) / (j * j) {
+        } else if distance >= 2.0 * real::powi(a, 3) / (j * j) {
             // Too short for full speed: the cruise shrinks to nothing.
             let ramp = a * a / j;
             let v = 0.5 * ((ramp * ramp + 4.0 * a * distance).sqrt() - ramp);
             [v / a + a / j, v / a, a / j]
         } else {
-            let t = (distance / (2.0 * j)).cbrt();
+            let t = real::cbrt(distance / (2.0 * j));
             [2.0 * t, t, t]
         };
         let least = LEAST_BOX * boxes.iter().sum::<f64>();

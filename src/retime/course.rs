@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::geom::{Pose2, unwrap_near};
+use crate::math::real;
 use crate::trajectory::plane_curve::{CurveError, Place, PlaneCurve};
 use crate::trajectory::{DriveLeg, StillLeg};
 
@@ -147,7 +148,7 @@ impl Proportional {
 
     /// Pose at a share of the way.
     pub fn pose(&self, share: f64) -> Pose2 {
-        let (sin, cos) = self.pose.yaw.sin_cos();
+        let (sin, cos) = real::sin_cos(self.pose.yaw);
         let along = self.drive * share;
         Pose2 { x: self.pose.x + along * cos, y: self.pose.y + along * sin, yaw: self.pose.yaw + self.turn * share }
     }

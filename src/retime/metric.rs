@@ -1,6 +1,7 @@
 //! A curve's parameter as a function of a length of one's own choice.
 
 use crate::math::quadrature::gauss_legendre;
+use crate::math::real;
 use crate::trajectory::plane_curve::{Place, PlaneCurve};
 
 /// A cell is halved until its polynomial's rate is right within this share in its middle.
@@ -58,9 +59,9 @@ impl Metric {
                 from,
                 start[0],
                 0.5 * start[1],
-                (10.0 * missing - 4.0 * slope + 0.5 * bend) / length.powi(3),
-                (-15.0 * missing + 7.0 * slope - bend) / length.powi(4),
-                (6.0 * missing - 3.0 * slope + 0.5 * bend) / length.powi(5),
+                (10.0 * missing - 4.0 * slope + 0.5 * bend) / real::powi(length, 3),
+                (-15.0 * missing + 7.0 * slope - bend) / real::powi(length, 4),
+                (6.0 * missing - 3.0 * slope + 0.5 * bend) / real::powi(length, 5),
             ],
         };
         let [u, middle, ..] = cell.at(0.5 * length);

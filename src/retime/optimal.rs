@@ -11,6 +11,7 @@
 //!
 //! Knows nothing of wheels, courses or robots: rows, limits and breaks.
 
+use crate::math::real;
 mod barrier;
 mod grid;
 mod guess;
@@ -57,7 +58,7 @@ pub fn fastest(problem: &Problem<'_>, mut rates: impl FnMut(f64, &mut Vec<[f64; 
     let coarse = Grid::new(problem, COARSE.0, &mut rates)?;
     let first = Pace::new(&coarse.knots, barrier::solve(problem, &coarse, COARSE.1, None)?.into_iter());
     let grid = Grid::new(problem, 1.0, &mut rates)?;
-    let near = |t: f64| first.at(first.time_at(t))[1].powi(2);
+    let near = |t: f64| real::powi(first.at(first.time_at(t))[1], 2);
     let cells = barrier::solve(problem, &grid, GAP, Some(&near))?;
     Some(Pace::new(&grid.knots, cells.into_iter()))
 }

@@ -1,5 +1,7 @@
 //! Largest speed, acceleration and jerk of every actuator over a leg, and the slow-down that restores its limits.
 
+use crate::math::real;
+
 /// Samples in every stretch between two breaks, besides its ends.
 const SAMPLES: usize = 7;
 /// How near a break its one-sided limit is taken, as a share of the stretch.
@@ -121,7 +123,7 @@ pub fn slow_down(peaks: &Peaks, limits: &[[Option<f64>; 3]], hold: f64) -> f64 {
     let mut factor = 1.0f64;
     for ((rates, jumps), limit) in peaks.rates.iter().zip(&peaks.jumps).zip(limits) {
         let over = |k: usize| limit[k].map_or(0.0, |limit| rates[k] / limit);
-        factor = factor.max(over(0)).max(over(1).sqrt()).max(over(2).cbrt());
+        factor = factor.max(over(0)).max(over(1).sqrt()).max(real::cbrt(over(2)));
         let Some(limit) = limit[2] else { continue };
         for [jump, jerk] in jumps {
             factor = jump_slow_down(factor, HELD_JUMP * jump / hold, *jerk, limit);
@@ -156,13 +158,13 @@ mod tests {
     #[test]
     fn peaks_between_samples_are_found_to_rounding() {
         let wave = |t: f64, out: &mut Vec<[f64; 3]>| {
-            out.push([(3.0 * t + 0.2).sin(), -2.0 * (t - 0.41).powi(2) + 0.3, (t - 1.3).exp()]);
+            out.push([real::sin(3.0 * t + 0.2), -2.0 * real::powi(t - 0.41, 2) + 0.3, real::exp(t - 1.3)]);
             out.push([0.0; 3]);
         };
         let found = peaks(&[0.0, 0.2, 0.2, 1.0], true, wave);
         assert!((found.rates[0][0] - 1.0).abs() < 1e-12);
         assert!((found.rates[0][1] - 0.3962).abs() < 1e-8, "{found:?}");
-        assert!((found.rates[0][2] - (-0.3f64).exp()).abs() < 1e-8);
+        assert!((found.rates[0][2] - real::exp(-0.3)).abs() < 1e-8);
         assert_eq!(found.rates[1], [0.0; 3]);
         assert!(found.jumps.iter().all(Vec::is_empty));
     }
@@ -186,6 +188,6 @@ mod tests {
         assert!((slow_down(&of([0.5, 0.2, 1.6], 0.0), &limits, 0.1) - 2.0).abs() < 1e-15);
         assert_eq!(slow_down(&of([9.0, 9.0, 9.0], 0.0), &[[None; 3]], 0.1), 1.0);
         let jumping = slow_down(&of([0.0, 0.0, 0.15], 0.08), &limits, 0.1);
-        assert!((0.1 / jumping.powi(3) + 0.6 / jumping.powi(2) - 0.2).abs() < 1e-12);
+        assert!((0.1 / real::powi(jumping, 3) + 0.6 / real::powi(jumping, 2) - 0.2).abs() < 1e-12);
     }
 }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::geom::Pose2;
+use crate::math::real;
 use crate::mission::TimeLaw;
 
 use super::course::{Course, Jet};
@@ -216,7 +217,7 @@ impl MotionProfile {
         let gamma = self.stretch();
         let mut jets = self.legs[leg].jets(since);
         for jet in &mut jets {
-            (1..4).for_each(|k| jet[k] /= gamma.powi(k as i32));
+            (1..4).for_each(|k| jet[k] /= real::powi(gamma, k as i32));
         }
         let joints = jets.split_off(2);
         let wheels = [0, 1].map(|side| {

@@ -1,6 +1,7 @@
 use super::*;
 use crate::geom::Pose2;
 use crate::math::poly::{Piece, PiecewisePoly};
+use crate::math::real;
 use crate::trajectory::{DriveLeg, StillLeg, fixtures, given};
 
 const LAWS: [TimeLaw; 6] =
@@ -30,9 +31,9 @@ fn optimised() -> Trajectory {
 fn septic(t: f64, a: [f64; 4], b: [f64; 4]) -> [f64; 8] {
     let low = [a[0], a[1], a[2] / 2.0, a[3] / 6.0];
     let factor = |k: usize, order: usize| (k + 1 - order..=k).map(|m| m as f64).product::<f64>();
-    let matrix = nalgebra::Matrix4::from_fn(|order, j| factor(4 + j, order) * t.powi((4 + j - order) as i32));
+    let matrix = nalgebra::Matrix4::from_fn(|order, j| factor(4 + j, order) * real::powi(t, (4 + j - order) as i32));
     let right = nalgebra::Vector4::from_fn(|order, _| {
-        b[order] - (order..4).map(|k| factor(k, order) * low[k] * t.powi((k - order) as i32)).sum::<f64>()
+        b[order] - (order..4).map(|k| factor(k, order) * low[k] * real::powi(t, (k - order) as i32)).sum::<f64>()
     });
     let high = matrix.lu().solve(&right).unwrap();
     [low[0], low[1], low[2], low[3], high[0], high[1], high[2], high[3]]
@@ -154,7 +155,7 @@ fn derivatives_are_those_of_the_values() {
                     assert!(((high[k] - low[k]) / (2.0 * h) - at[k + 1]).abs() < 1e-4, "{law:?} order {k} at {t}");
                 }
             }
-            let v = (high.pose.x - low.pose.x).hypot(high.pose.y - low.pose.y) / (2.0 * h);
+            let v = real::hypot(high.pose.x - low.pose.x, high.pose.y - low.pose.y) / (2.0 * h);
             assert!((v - 0.5 * (at.wheels[0][1] + at.wheels[1][1])).abs() < 1e-6);
             let omega = (high.pose.yaw - low.pose.yaw) / (2.0 * h);
             assert!((omega - (at.wheels[1][1] - at.wheels[0][1]) / robot.track_width).abs() < 1e-6);

@@ -1,5 +1,6 @@
 //! Convex shapes about their own centre.
 
+use crate::math::real;
 use nalgebra::Vector3;
 
 /// A convex body about its own centre.
@@ -35,7 +36,7 @@ impl Convex {
         match self {
             Self::Box { half } => Vector3::new(half[0].copysign(d.x), half[1].copysign(d.y), half[2].copysign(d.z)),
             Self::Cylinder { radius, half_length } => {
-                let flat = d.x.hypot(d.y);
+                let flat = real::hypot(d.x, d.y);
                 let scale = if flat > 0.0 { radius / flat } else { 0.0 };
                 Vector3::new(d.x * scale, d.y * scale, half_length.copysign(d.z))
             }
@@ -60,7 +61,7 @@ impl Convex {
     pub fn bounding_radius(&self) -> f64 {
         match self {
             Self::Box { half } => half.iter().map(|h| h * h).sum::<f64>().sqrt(),
-            Self::Cylinder { radius, half_length } => radius.hypot(*half_length),
+            Self::Cylinder { radius, half_length } => real::hypot(*radius, *half_length),
             Self::Sphere { radius } => *radius,
             Self::Hull { vertices } => {
                 vertices.iter().map(|v| v.iter().map(|c| c * c).sum::<f64>()).fold(0.0, f64::max).sqrt()

@@ -9,6 +9,7 @@ use super::tree::{self, Tree};
 use super::urdf::Urdf;
 use super::wheels::Wheels;
 use crate::diag::{Diagnostic, Diagnostics};
+use crate::math::real;
 
 /// Angle below which axes count as parallel, rad: published angles are rounded (-1.57 for -pi/2).
 pub(super) const PARALLEL: f64 = 0.01;
@@ -68,9 +69,9 @@ pub(super) fn drive(
     let first = &left[0];
     for (axle, j) in left.iter().chain(&right).zip(wheels.all()) {
         let name = &joints[j].name;
-        let angle = axle.axis.cross(&first.axis).norm().min(1.0).asin();
+        let angle = real::asin(axle.axis.cross(&first.axis).norm().min(1.0));
         if !axle.horizontal() {
-            let tilt = axle.axis.z.abs().min(1.0).asin().to_degrees();
+            let tilt = real::asin(axle.axis.z.abs().min(1.0)).to_degrees();
             let message = format!("axis of drive wheel `{name}` is not horizontal: tilted by {tilt:.2} degrees");
             let fault = Diagnostic::error("robot/wheel-not-horizontal", message).at(&urdf.joint_spans[j]);
             faults.push(

@@ -185,6 +185,7 @@ impl<'a> Quickhull<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::real;
     use proptest::prelude::*;
 
     fn support(points: &[[f64; 3]], d: [f64; 3]) -> f64 {
@@ -195,7 +196,7 @@ mod tests {
         for i in 0..200 {
             // A spiral over the sphere.
             let z = 1.0 - (2.0 * f64::from(i) + 1.0) / 200.0;
-            let (sin, cos) = (2.4 * f64::from(i)).sin_cos();
+            let (sin, cos) = real::sin_cos(2.4 * f64::from(i));
             let d = [(1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z];
             assert!((support(points, d) - support(hull, d)).abs() <= tolerance, "direction {d:?}");
         }
@@ -273,7 +274,7 @@ mod tests {
         let points: Vec<[f64; 3]> = (0..2000)
             .map(|i| {
                 let z = 1.0 - (2.0 * f64::from(i) + 1.0) / 2000.0;
-                let (sin, cos) = (2.4 * f64::from(i)).sin_cos();
+                let (sin, cos) = real::sin_cos(2.4 * f64::from(i));
                 [(1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z]
             })
             .collect();

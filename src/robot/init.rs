@@ -11,6 +11,7 @@ use super::{
     Assembled, Files, IgnoreReason, RobotInputs, RobotModel, assemble, drive, joints, shapes, tree, urdf, wheels,
 };
 use crate::diag::Diagnostics;
+use crate::math::real;
 use crate::mission::LimitsSpec;
 
 /// How figures that must be measured are marked.
@@ -295,6 +296,6 @@ fn yaml(name: &str) -> String {
 
 /// A length or speed without the last digits of its computation.
 fn rounded(value: f64) -> f64 {
-    let scale = 1e9 / 10f64.powf(value.abs().max(1e-9).log10().ceil());
+    let scale = 1e9 / real::powf(10.0, real::log10(value.abs().max(1e-9)).ceil());
     (value * scale).round() / scale
 }

@@ -28,6 +28,7 @@ use nalgebra::{Isometry3, Unit, Vector3};
 
 use crate::diag::Diagnostics;
 use crate::geom::Pose2;
+use crate::math::real;
 use crate::mission::{LimitsSpec, Tolerance, ToleranceSpec};
 pub use bodies::NoFiles;
 pub use convex::Convex;
@@ -211,7 +212,7 @@ impl RobotModel {
     pub fn base_of(&self, frame: &str, pose: Isometry3<f64>) -> Pose2 {
         let pose = if frame == self.root_link { pose * self.base_from_root.inverse() } else { pose };
         let forward = pose.rotation * Vector3::x();
-        Pose2::new(pose.translation.x, pose.translation.y, forward.y.atan2(forward.x))
+        Pose2::new(pose.translation.x, pose.translation.y, real::atan2(forward.y, forward.x))
     }
 
     /// Whether any joint moves a body.

@@ -11,6 +11,7 @@ use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3};
 use super::bound::upper_bound;
 use super::{Convex, RobotModel};
 use crate::geom::Aabb;
+use crate::math::real;
 
 /// Added to every bound for rounding, m.
 const ROUNDING: f64 = 1e-9;
@@ -43,9 +44,9 @@ impl Outer {
                 ((0..8).map(corner).collect(), 0.0)
             }
             Convex::Cylinder { radius, half_length } => {
-                let outer = radius / (PI / SIDES as f64).cos();
+                let outer = radius / real::cos(PI / SIDES as f64);
                 let rim = |i: usize| {
-                    let (sin, cos) = (2.0 * PI * (i / 2) as f64 / SIDES as f64).sin_cos();
+                    let (sin, cos) = real::sin_cos(2.0 * PI * (i / 2) as f64 / SIDES as f64);
                     Vector3::new(outer * cos, outer * sin, signs[i & 1] * half_length)
                 };
                 ((0..2 * SIDES).map(rim).collect(), 0.0)
@@ -154,7 +155,7 @@ impl<'a> Chain<'a> {
             pose *= body.pose_in_parent(&q);
             let Some(motion) = &body.motion else { continue };
             let axis = pose.rotation * motion.axis.into_inner();
-            let (flat, upright) = (axis.x.hypot(axis.y), axis.z.abs());
+            let (flat, upright) = (real::hypot(axis.x, axis.y), axis.z.abs());
             let share = match (motion.prismatic, height) {
                 _ if !tilt_known => 1.0,
                 (true, true) => upright,
@@ -189,7 +190,7 @@ fn horizontal(convex: &Convex, pose: &Isometry3<f64>) -> f64 {
         let p = pose.translation.vector + pose.rotation * convex.support(&(pose.rotation.inverse() * direction));
         Vector3::new(p.x, p.y, 0.0)
     };
-    let around = (0..SIDES).map(|i| (2.0 * PI * i as f64 / SIDES as f64).sin_cos());
+    let around = (0..SIDES).map(|i| real::sin_cos(2.0 * PI * i as f64 / SIDES as f64));
     let mut best = around
         .map(|(sin, cos)| step(Vector3::new(cos, sin, 0.0)))
         .fold(Vector3::zeros(), |a, b| if b.norm_squared() > a.norm_squared() { b } else { a });

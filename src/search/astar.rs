@@ -14,6 +14,7 @@ use super::lattice::{HEADINGS, Lattice, LatticeState, heading_angle, nearest_hea
 use super::route::{Grain, Route};
 use super::{Query, SearchOptions, region};
 use crate::geom::{Pose2, wrap_angle};
+use crate::math::real;
 
 /// How much the estimate weighs: paths are at most this much longer than the lattice's best.
 const WEIGHT: f64 = 1.4;
@@ -285,7 +286,7 @@ impl<const W: usize> AStar<'_, W> {
                     continue;
                 }
                 let offset = [f64::from(i) - at[0], f64::from(j) - at[1]];
-                let steps = offset[0].hypot(offset[1]);
+                let steps = real::hypot(offset[0], offset[1]);
                 for reverse in [false, true] {
                     if reverse && !self.options.reverse {
                         continue;

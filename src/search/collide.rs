@@ -14,6 +14,7 @@ use crate::esdf::Esdf;
 use crate::geom::{Aabb, Pose2};
 use crate::map::VoxelMap;
 use crate::math::gjk;
+use crate::math::real;
 use crate::mission::Unknown;
 use crate::robot::RobotModel;
 
@@ -172,7 +173,7 @@ impl<'a, const W: usize> Collider<'a, W> {
         let slack = moving.iter().flat_map(|m| &m.step_moves).fold(0.0f64, |a, b| a.max(*b)) / 2.0;
         heights = [heights[0] - slack, heights[1] + slack];
         let reach = rigid.iter().chain(&moving).map(|p| p.reach).fold(0.0, f64::max);
-        let ball = (0.5 * (heights[0] + heights[1]), reach.hypot(0.5 * (heights[1] - heights[0])));
+        let ball = (0.5 * (heights[0] + heights[1]), real::hypot(reach, 0.5 * (heights[1] - heights[0])));
         let mut order = Vec::with_capacity(postures.count());
         let mut seen = vec![false; postures.count()];
         for step in (0..=10).rev().map(|k| 1usize << k) {
@@ -412,7 +413,7 @@ impl<'a, const W: usize> Collider<'a, W> {
         }
         let ends = course.ends.get_or_init(|| [course.motion.from.into(), course.motion.to.into()]);
         let ends = [pose.under(&ends[0]), pose.under(&ends[1])];
-        let sweep = Sweep { ends, bulge: placed.reach * (1.0 - course.half_turn.cos()) };
+        let sweep = Sweep { ends, bulge: placed.reach * (1.0 - real::cos(course.half_turn)) };
         let near = course.near.get_or_init(|| self.near(course));
         self.exact_gap(placed, &sweep, near, self.clearance + useful)
     }
@@ -565,7 +566,7 @@ fn overlap(apart: impl Fn(&Vector3<f64>) -> Vector3<f64>, rotation: &Matrix3<f64
         let z = 1.0 - (2.0 * f64::from(k) + 1.0) / 200.0;
         let angle = f64::from(k) * std::f64::consts::PI * (1.0 + 5f64.sqrt());
         let flat = (1.0 - z * z).sqrt();
-        Vector3::new(flat * angle.cos(), flat * angle.sin(), z)
+        Vector3::new(flat * real::cos(angle), flat * real::sin(angle), z)
     });
     let axes = (0..3).flat_map(|i| {
         let own: Vector3<f64> = rotation.column(i).into();
@@ -586,7 +587,7 @@ fn edge_distance(map: &Aabb, body: &Aabb) -> f64 {
 }
 
 fn box_gap(a: &Aabb, b: &Aabb) -> f64 {
-    (0..3).map(|i| (a.min[i] - b.max[i]).max(b.min[i] - a.max[i]).max(0.0).powi(2)).sum::<f64>().sqrt()
+    (0..3).map(|i| real::powi((a.min[i] - b.max[i]).max(b.min[i] - a.max[i]).max(0.0), 2)).sum::<f64>().sqrt()
 }
 
 /// Distance of an oriented box to the bounds, along its own axes, of an axis-aligned one: not above their distance.
@@ -598,7 +599,7 @@ fn gap_in_frame(rotation: &Matrix3<f64>, centre: &Vector3<f64>, half: [f64; 3], 
         .map(|i| {
             let column = rotation.column(i);
             let extent = column[0].abs() * size[0] + column[1].abs() * size[1] + column[2].abs() * size[2];
-            (offset[i].abs() - half[i] - extent).max(0.0).powi(2)
+            real::powi((offset[i].abs() - half[i] - extent).max(0.0), 2)
         })
         .sum::<f64>()
         .sqrt()

@@ -2,6 +2,7 @@
 
 use super::{SearchMove, SearchPath, SearchState};
 use crate::math::poly::{Piece, PiecewisePoly};
+use crate::math::real;
 use crate::trajectory::{DriveLeg, Leg, StillLeg, Trajectory, TrajectorySource};
 
 impl SearchPath {
@@ -52,7 +53,9 @@ fn straight(from: &SearchState, to: &SearchState) -> Piece {
         let mut joint = vec![*a];
         if a != b {
             joint.extend([0.0; 3]);
-            joint.extend([(35.0, 4), (-84.0, 5), (70.0, 6), (-20.0, 7)].map(|(c, k)| (b - a) * c / length.powi(k)));
+            joint.extend(
+                [(35.0, 4), (-84.0, 5), (70.0, 6), (-20.0, 7)].map(|(c, k)| (b - a) * c / real::powi(length, k)),
+            );
         }
         coefficients.push(joint);
     }

@@ -9,6 +9,7 @@ use super::posture::Postures;
 use super::solve::{self, End, NoPath, Problem, Solver};
 use super::{Contact, Query, SearchPath, SearchState, region};
 use crate::geom::Pose2;
+use crate::math::real;
 use crate::robot::{Convex, RobotModel};
 
 /// Poses and postures that are looked at for the one that is least blocked.
@@ -97,7 +98,7 @@ fn nearest_free<const W: usize>(
     let mut around: Vec<(f64, [f64; 2])> = around
         .map(|(i, j)| {
             let place = lattice.position(i, j);
-            ((place[0] - pose.x).hypot(place[1] - pose.y), place)
+            (real::hypot(place[0] - pose.x, place[1] - pose.y), place)
         })
         .collect();
     around.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -171,7 +172,7 @@ impl Space {
         while let Some((i, j)) = open.pop() {
             count += 1;
             let [x, y] = lattice.position(i, j);
-            let distance = (x - target[0]).hypot(y - target[1]);
+            let distance = real::hypot(x - target[0], y - target[1]);
             if distance < nearest.0 {
                 nearest = (distance, [x, y]);
             }

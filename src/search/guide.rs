@@ -10,6 +10,7 @@ use super::lattice::Lattice;
 use super::queue::RadixHeap;
 use super::route::Route;
 use super::{Query, SearchOptions};
+use crate::math::real;
 
 /// Routes that are tried at least, and one more for so many metres from start to goal: a long way has more places to be blocked.
 const TRIES: usize = 6;
@@ -100,7 +101,7 @@ impl<'a, C: Fn([f64; 2]) -> f64> Guide<'a, C> {
         let range = |d: usize| (at[d] - reach).ceil() as i32..=(at[d] + reach).floor() as i32;
         for i in range(0) {
             for j in range(1) {
-                let near = (f64::from(i) - at[0]).hypot(f64::from(j) - at[1]) <= reach;
+                let near = real::hypot(f64::from(i) - at[0], f64::from(j) - at[1]) <= reach;
                 if near && self.lattice.contains(i, j) {
                     let own = &mut self.places[self.lattice.index(i, j)].extra;
                     *own = ((*own + 1) * factor).min(1_000) - 1;
@@ -211,10 +212,10 @@ fn corners(points: &[[f64; 2]], bend: f64) -> Vec<[f64; 2]> {
         keep[b] = true;
         let (p, q) = (points[a], points[b]);
         let (dx, dy) = (q[0] - p[0], q[1] - p[1]);
-        let length = dx.hypot(dy);
+        let length = real::hypot(dx, dy);
         let off = |r: [f64; 2]| {
             let (ex, ey) = (r[0] - p[0], r[1] - p[1]);
-            if length > 0.0 { (dx * ey - dy * ex).abs() / length } else { ex.hypot(ey) }
+            if length > 0.0 { (dx * ey - dy * ex).abs() / length } else { real::hypot(ex, ey) }
         };
         let farthest = (a + 1..b).map(|k| (off(points[k]), k)).max_by(|a, b| a.0.total_cmp(&b.0));
         if let Some((_, k)) = farthest.filter(|(distance, _)| *distance > bend) {
@@ -241,12 +242,12 @@ mod tests {
         assert!(middle.iter().all(|p| (p[1] - 1.0).abs() < 0.06), "{middle:?}");
         guide.avoid([1.5, 1.0]);
         let around = guide.way([[0.3, 1.0], [2.7, 1.0]], 80).expect("free");
-        assert!(around.iter().all(|p| (p[0] - 1.5).hypot(p[1] - 1.0) > 0.19), "{around:?}");
+        assert!(around.iter().all(|p| real::hypot(p[0] - 1.5, p[1] - 1.0) > 0.19), "{around:?}");
     }
 
     #[test]
     fn corners_stay_within_the_bend() {
-        let points: Vec<[f64; 2]> = (0..100).map(|k| [0.05 * f64::from(k), (0.05 * f64::from(k)).sin()]).collect();
+        let points: Vec<[f64; 2]> = (0..100).map(|k| [0.05 * f64::from(k), real::sin(0.05 * f64::from(k))]).collect();
         let kept = corners(&points, 0.03);
         assert!(kept.len() < 20 && kept.last() == points.last());
         let mut all = vec![points[0]];
@@ -255,7 +256,7 @@ mod tests {
             let off = all.windows(2).map(|w| {
                 let (dx, dy) = (w[1][0] - w[0][0], w[1][1] - w[0][1]);
                 let share = (((p[0] - w[0][0]) * dx + (p[1] - w[0][1]) * dy) / (dx * dx + dy * dy)).clamp(0.0, 1.0);
-                (p[0] - w[0][0] - share * dx).hypot(p[1] - w[0][1] - share * dy)
+                real::hypot(p[0] - w[0][0] - share * dx, p[1] - w[0][1] - share * dy)
             });
             assert!(off.fold(f64::INFINITY, f64::min) <= 0.03 + 1e-9);
         }

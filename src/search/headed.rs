@@ -11,6 +11,7 @@ use std::f32::consts::{PI, TAU};
 use super::Query;
 use super::queue::RadixHeap;
 use super::route::Route;
+use crate::math::real;
 
 /// Routes that are tried.
 pub(super) const TRIES: usize = 4;
@@ -114,8 +115,8 @@ impl<'a, C: Fn([f64; 2]) -> f64> Headed<'a, C> {
         let moves = std::array::from_fn(|k| {
             let [x, y] = QUARTER[k % QUARTER.len()];
             let by = [[x, y], [-y, x], [-x, -y], [y, -x]][k / QUARTER.len()];
-            let [x, y] = by.map(|steps| steps as f32);
-            Move { by, angle: y.atan2(x), length: x.hypot(y) * STEP as f32 }
+            let [x, y] = by.map(f64::from);
+            Move { by, angle: real::atan2(y, x) as f32, length: (real::hypot(x, y) * STEP) as f32 }
         });
         Self {
             query,
@@ -154,12 +155,12 @@ impl<'a, C: Fn([f64; 2]) -> f64> Headed<'a, C> {
         let cell = self.cell(at)?;
         if self.numbers[cell] == 0 {
             let place = self.place(at);
-            let [dx, dy] = [self.query.goal.x - place[0], self.query.goal.y - place[1]].map(|v| v as f32);
+            let [dx, dy] = [self.query.goal.x - place[0], self.query.goal.y - place[1]];
             self.spots.push(Spot {
                 at,
                 room: self.room(place),
-                to_goal: dx.hypot(dy),
-                bearing: dy.atan2(dx),
+                to_goal: real::hypot(dx, dy) as f32,
+                bearing: real::atan2(dy, dx) as f32,
                 dear: 1.0,
                 sight: None,
             });
@@ -215,7 +216,7 @@ impl<'a, C: Fn([f64; 2]) -> f64> Headed<'a, C> {
         let range = |d: usize| (at[d] - reach).ceil() as i32..=(at[d] + reach).floor() as i32;
         for i in range(0) {
             for j in range(1) {
-                let near = (f64::from(i) - at[0]).hypot(f64::from(j) - at[1]) <= reach;
+                let near = real::hypot(f64::from(i) - at[0], f64::from(j) - at[1]) <= reach;
                 if let Some(spot) = near.then(|| self.spot([i, j])).flatten() {
                     self.spots[spot].dear += share;
                 }
@@ -352,7 +353,7 @@ mod tests {
     /// From round obstacles, with the map's edge as one more.
     fn clearance(obstacles: &[[f64; 3]], [x, y]: [f64; 2]) -> f64 {
         let edge = x.min(y).min(SIDE - x).min(SIDE - y);
-        obstacles.iter().map(|o| (x - o[0]).hypot(y - o[1]) - o[2]).fold(edge, f64::min)
+        obstacles.iter().map(|o| real::hypot(x - o[0], y - o[1]) - o[2]).fold(edge, f64::min)
     }
 
     fn headed<'a>(

@@ -7,6 +7,7 @@ use super::{Query, region};
 use crate::esdf::{self, Esdf};
 use crate::geom::Pose2;
 use crate::map::VoxelMap;
+use crate::math::real;
 use crate::robot::{Convex, RobotModel};
 
 /// A disc inside one of the robot's rigid shapes at every height of a range: an obstacle at such a height must keep off it.
@@ -58,7 +59,7 @@ impl Core {
 
     /// Where the centre is in a pose.
     pub fn centre(&self, pose: Pose2) -> [f64; 2] {
-        let (sin, cos) = pose.yaw.sin_cos();
+        let (sin, cos) = real::sin_cos(pose.yaw);
         let [x, y] = self.offset;
         [pose.x + cos * x - sin * y, pose.y + sin * x + cos * y]
     }
@@ -137,7 +138,7 @@ impl CostToGo {
                 if !lattice.contains(i, j) || tenths[lattice.index(i, j)] == 0 {
                     continue;
                 }
-                let off = (f64::from(i) - at[0]).hypot(f64::from(j) - at[1]);
+                let off = real::hypot(f64::from(i) - at[0], f64::from(j) - at[1]);
                 if reach == 0.0 || off <= reach + 1.42 && clearances[lattice.index(i, j)] >= least {
                     tenths[lattice.index(i, j)] = 0;
                     buckets[0].push((i, j));
@@ -196,7 +197,7 @@ impl CostToGo {
             let centre = self.core.centre(pose);
             lattice.coordinates(centre[0], centre[1])
         });
-        let steps = (a[0] - b[0]).hypot(a[1] - b[1]).ceil().max(1.0);
+        let steps = real::hypot(a[0] - b[0], a[1] - b[1]).ceil().max(1.0);
         let least = least_clearance(lattice, resolution, clearance);
         (0..=steps as usize).all(|k| {
             let share = k as f64 / steps;

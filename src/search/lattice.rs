@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 
 use crate::geom::{Pose2, wrap_angle};
 use crate::map::VoxelMap;
+use crate::math::real;
 
 /// Headings in a full turn: 5 degrees.
 pub(super) const HEADINGS: usize = 72;
@@ -101,8 +102,8 @@ fn drives(step: f64) -> Vec<Vec<Drive>> {
             if gcd(di.unsigned_abs(), dj.unsigned_abs()) != 1 {
                 continue;
             }
-            let direction = f64::from(dj).atan2(f64::from(di));
-            let length = f64::from(di).hypot(f64::from(dj)) * step;
+            let direction = real::atan2(f64::from(dj), f64::from(di));
+            let length = real::hypot(f64::from(di), f64::from(dj)) * step;
             all[nearest_heading(direction) as usize].push(Drive { di, dj, length, direction });
         }
     }

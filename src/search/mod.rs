@@ -31,6 +31,7 @@ mod solve;
 use crate::esdf::Esdf;
 use crate::geom::Pose2;
 use crate::map::VoxelMap;
+use crate::math::real;
 use crate::robot::RobotModel;
 
 pub use collide::Contact;
@@ -117,7 +118,7 @@ pub fn search(
     let bounds = map.bounds();
     for (which, pose) in [("start", query.start), ("goal", query.goal)] {
         let beyond = |axis: usize, at: f64| (bounds.min[axis] - at).max(at - bounds.max[axis]).max(0.0);
-        let beyond = beyond(0, pose.x).hypot(beyond(1, pose.y));
+        let beyond = real::hypot(beyond(0, pose.x), beyond(1, pose.y));
         if beyond > if which == "goal" { query.goal_within } else { 0.0 } {
             let [min, max] = [bounds.min, bounds.max];
             return Err(SearchError::OffMap { which, x: pose.x, y: pose.y, bounds: [min[0], max[0], min[1], max[1]] });

@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::posture::Postures;
 use crate::geom::{Aabb, Pose2};
+use crate::math::real;
 use crate::robot::Convex;
 
 /// A pose of the base, its sine and cosine known.
@@ -17,7 +18,7 @@ pub(super) struct Base {
 
 impl From<Pose2> for Base {
     fn from(pose: Pose2) -> Self {
-        let (sin, cos) = pose.yaw.sin_cos();
+        let (sin, cos) = real::sin_cos(pose.yaw);
         Self { sin, cos, x: pose.x, y: pose.y }
     }
 }
@@ -77,7 +78,7 @@ impl Posed {
 
     /// No point of a shape is farther from the z axis than this, m; exact for boxes, hulls and balls.
     pub fn farthest_from_axis(&self, convex: &Convex) -> f64 {
-        let flat = |p: Vector3<f64>| p.x.hypot(p.y);
+        let flat = |p: Vector3<f64>| real::hypot(p.x, p.y);
         let of = |points: &mut dyn Iterator<Item = Vector3<f64>>| {
             points.map(|p| flat(self.centre + self.rotation * p)).fold(0.0, f64::max)
         };
@@ -192,7 +193,7 @@ fn cover(convex: &Convex, half: [f64; 3], bounding: f64) -> (Vec<Covering>, f64)
 fn depth(convex: &Convex, p: &Vector3<f64>) -> Option<f64> {
     let depth = match convex {
         Convex::Box { half } => (0..3).map(|a| half[a] - p[a].abs()).fold(f64::INFINITY, f64::min),
-        Convex::Cylinder { radius, half_length } => (radius - p.x.hypot(p.y)).min(half_length - p.z.abs()),
+        Convex::Cylinder { radius, half_length } => (radius - real::hypot(p.x, p.y)).min(half_length - p.z.abs()),
         Convex::Sphere { radius } => radius - p.norm(),
         Convex::Hull { .. } => return None,
     };
@@ -225,7 +226,7 @@ mod tests {
             let z = 1.0 - (2.0 * f64::from(k) + 1.0) / 400.0;
             let angle = f64::from(k) * 2.399_963;
             let flat = (1.0 - z * z).sqrt();
-            Vector3::new(flat * angle.cos(), flat * angle.sin(), z)
+            Vector3::new(flat * real::cos(angle), flat * real::sin(angle), z)
         })
     }
 
@@ -240,7 +241,7 @@ mod tests {
                 for a in 0..3 {
                     prop_assert!(bounds.min[a] <= p[a] + 1e-9 && p[a] <= bounds.max[a] + 1e-9);
                 }
-                farthest = farthest.max(p.x.hypot(p.y));
+                farthest = farthest.max(real::hypot(p.x, p.y));
                 top = top.max(p.z);
             }
             prop_assert!(farthest <= reach + 1e-9, "{farthest} {reach}");

@@ -13,6 +13,7 @@ use super::posture::{self, Postures};
 use super::solve::{self, End, Problem};
 use super::{Query, SearchMove, SearchPath, SearchState, quick};
 use crate::geom::Pose2;
+use crate::math::real;
 
 /// Planned ends keep off the rim by so much, m, or by half the radius: commands may miss a plan by that.
 const RIM: f64 = 1e-3;
@@ -28,7 +29,7 @@ pub(super) fn reach(query: &Query) -> f64 {
 pub(super) fn nearest(query: &Query, from: [f64; 2]) -> [f64; 2] {
     let goal = [query.goal.x, query.goal.y];
     let off = [from[0] - goal[0], from[1] - goal[1]];
-    let (distance, reach) = (off[0].hypot(off[1]), reach(query));
+    let (distance, reach) = (real::hypot(off[0], off[1]), reach(query));
     if reach == 0.0 {
         goal
     } else if distance <= reach {
@@ -44,7 +45,7 @@ pub(super) fn places<'a>(query: &Query, lattice: &'a Lattice) -> impl Iterator<I
     let at = lattice.coordinates(goal[0], goal[1]);
     let reach = reach(query) / lattice.step;
     let range = |d: usize| (at[d] - reach).ceil() as i32..=(at[d] + reach).floor() as i32;
-    let off = |(i, j): &(i32, i32)| (f64::from(*i) - at[0]).hypot(f64::from(*j) - at[1]);
+    let off = |(i, j): &(i32, i32)| real::hypot(f64::from(*i) - at[0], f64::from(*j) - at[1]);
     let around = range(0).flat_map(|i| range(1).map(move |j| (i, j)));
     let mut around: Vec<(i32, i32)> =
         around.filter(|p| reach > 0.0 && lattice.contains(p.0, p.1) && off(p) <= reach).collect();
@@ -158,7 +159,7 @@ mod tests {
         fn a_way_enters_a_disc_where_it_is_first_within_it(
             off in [-2.0..2.0f64, -2.0..2.0], by in [-3.0..3.0f64, -3.0..3.0], reach in 0.05..1.0f64,
         ) {
-            let distance = |share: f64| (off[0] + share * by[0]).hypot(off[1] + share * by[1]);
+            let distance = |share: f64| real::hypot(off[0] + share * by[0], off[1] + share * by[1]);
             let first = (0..=2000).map(|k| f64::from(k) / 2000.0).find(|share| distance(*share) <= reach);
             match (entry(off, by, reach), first) {
                 (Some(found), Some(first)) => {

@@ -8,6 +8,7 @@ use std::collections::BTreeSet;
 
 use super::joint_space::{JointSpace, between};
 use super::posture::{FEW_POSTURES, MOST_POSTURES, Roadmap};
+use crate::math::real;
 use crate::robot::RobotModel;
 
 /// Time that a step may take at the joints' planning speeds, s, if there is room for as many postures.
@@ -105,7 +106,7 @@ impl Builder<'_> {
             for k in 0..8 {
                 let sign = |bit: usize, half: f64| if k >> bit & 1 == 0 { -half } else { half };
                 let corner = pose * nalgebra::Point3::new(sign(0, x), sign(1, y), sign(2, z));
-                wide = wide.max(corner.x.hypot(corner.y));
+                wide = wide.max(real::hypot(corner.x, corner.y));
                 top = top.max(corner.z);
             }
             (wide, top)

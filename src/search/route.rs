@@ -2,6 +2,7 @@
 
 use super::collide::BaseMotion;
 use crate::geom::{Pose2, wrap_angle};
+use crate::math::real;
 
 /// Longest drive (m) and largest turn (rad) that are checked as one sweep. Shorter ones let postures change more often.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,10 +44,10 @@ impl Route {
     pub fn drive_to(&mut self, to: [f64; 2], reverse: bool) {
         let at = self.corners[self.corners.len() - 1];
         let (dx, dy) = (to[0] - at[0], to[1] - at[1]);
-        if dx.hypot(dy) < 1e-9 {
+        if real::hypot(dx, dy) < 1e-9 {
             return;
         }
-        let yaw = dy.atan2(dx) + if reverse { std::f64::consts::PI } else { 0.0 };
+        let yaw = real::atan2(dy, dx) + if reverse { std::f64::consts::PI } else { 0.0 };
         self.end_with(Some(yaw));
         // A corner that does not turn is none.
         let last = self.turns.len() - 1;
@@ -96,7 +97,7 @@ impl Route {
 
     fn length(&self, drive: usize) -> f64 {
         let (a, b) = (self.corners[drive], self.corners[drive + 1]);
-        (a[0] - b[0]).hypot(a[1] - b[1])
+        real::hypot(a[0] - b[0], a[1] - b[1])
     }
 
     /// All motions in order, cut into pieces. The first and the last stand still: postures may change before the base moves, and after.
@@ -150,7 +151,7 @@ mod tests {
                 at = piece.to;
             }
             let last = points[points.len() - 1];
-            prop_assert!((at.x - last.0).hypot(at.y - last.1) < 1e-9 && wrap_angle(at.yaw - 1.0).abs() < 1e-9);
+            prop_assert!(real::hypot(at.x - last.0, at.y - last.1) < 1e-9 && wrap_angle(at.yaw - 1.0).abs() < 1e-9);
             prop_assert_eq!(route.turns.len(), route.corners.len());
             prop_assert_eq!(route.reverse.len() + 1, route.corners.len());
         }

@@ -7,6 +7,7 @@ use super::bits::Bits;
 use super::collide::{BaseMotion, Collider};
 use super::route::{Grain, Route, drive_pieces, spin_pieces};
 use crate::geom::{Pose2, wrap_angle};
+use crate::math::real;
 
 /// A route with the free postures of each of its motions.
 pub(super) struct CheckedRoute<const W: usize> {
@@ -210,11 +211,11 @@ impl<'a, const W: usize> Shortcutter<'a, W> {
         }
         let (from, to) = (route.corners[a], route.corners[b]);
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
-        let length = dx.hypot(dy);
+        let length = real::hypot(dx, dy);
         if length < 1e-6 {
             return None;
         }
-        let yaw = dy.atan2(dx) + if route.reverse[a] { std::f64::consts::PI } else { 0.0 };
+        let yaw = real::atan2(dy, dx) + if route.reverse[a] { std::f64::consts::PI } else { 0.0 };
         let turn_a = wrap_angle(yaw - headings[a]);
         let at_end = b + 1 == route.corners.len();
         let turn_b =

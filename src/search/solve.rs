@@ -16,6 +16,7 @@ use super::{Query, SearchMove, SearchOptions, SearchPath, SearchState, region};
 use crate::esdf::Esdf;
 use crate::geom::{Pose2, wrap_angle};
 use crate::map::VoxelMap;
+use crate::math::real;
 use crate::robot::RobotModel;
 
 /// Sweeps that are cut differently may differ by this in what they find clear, m: bulges of turns and bounds of distances.
@@ -152,11 +153,11 @@ impl<'a, const W: usize> Solver<'a, W> {
         // The field may say too little by so much: nothing that fits is shut out.
         let slack = TOO_LOW * map.resolution;
         let [x, y] = core.offset;
-        let least = options.clearance - x.hypot(y);
+        let least = options.clearance - real::hypot(x, y);
         let masts = self.collider.masts();
         let guess = move |[x, y]: [f64; 2]| {
             let own = core.guessed_clearance(esdf, [x, y]);
-            let off = |mast: &Mast| mast.centre.x.hypot(mast.centre.y);
+            let off = |mast: &Mast| real::hypot(mast.centre.x, mast.centre.y);
             let of_mast = |mast: &Mast| {
                 slack + esdf.distance([x, y, mast.centre.z]) - mast.radius + off(mast) + least - options.clearance
             };

@@ -2,6 +2,7 @@
 
 use super::lattice::{HEADINGS, Lattice, LatticeState};
 use super::*;
+use crate::math::real;
 use crate::mission::Unknown;
 use crate::robot::{BaseLimits, Body, BodyMotion, Convex, MotionLimits, MovingJoint, Shape};
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
@@ -438,7 +439,7 @@ fn reachable(map: &VoxelMap, robot: &RobotModel, from: LatticeState, to: Lattice
             (pose.yaw.rem_euclid(std::f64::consts::TAU) * 1e6).round() as i64,
         ];
         *known.entry(key).or_insert_with(|| {
-            let (sin, cos) = pose.yaw.sin_cos();
+            let (sin, cos) = real::sin_cos(pose.yaw);
             let inside = [(-0.1, -0.06), (-0.1, 0.06), (0.06, -0.06), (0.06, 0.06)].iter().all(|(x, y)| {
                 let p = [pose.x + cos * x - sin * y, pose.y + sin * x + cos * y];
                 (0..2).all(|a| p[a] >= bounds.min[a] + clearance && p[a] <= bounds.max[a] - clearance)

@@ -12,6 +12,7 @@ pub mod steered_curve;
 
 use crate::geom::Pose2;
 use crate::math::poly::PiecewisePoly;
+use crate::math::real;
 use crate::mission::Parameterisation;
 
 /// Planned motion from start to goal.
@@ -126,7 +127,7 @@ pub fn through_poses(states: &[(Pose2, Vec<f64>)]) -> Trajectory {
     for pair in states.windows(2) {
         let ((from, joints_from), (to, joints_to)) = (&pair[0], &pair[1]);
         let (dx, dy) = (to.x - from.x, to.y - from.y);
-        let length = dx.hypot(dy);
+        let length = real::hypot(dx, dy);
         if length < 1e-9 {
             let still = StillLeg {
                 pose: Pose2 { yaw, ..*from },
@@ -139,7 +140,7 @@ pub fn through_poses(states: &[(Pose2, Vec<f64>)]) -> Trajectory {
             continue;
         }
         let middle = 0.5 * (from.yaw + to.yaw);
-        let direction = dy.atan2(dx);
+        let direction = real::atan2(dy, dx);
         let reverse = crate::geom::wrap_angle(direction - middle).abs() > std::f64::consts::FRAC_PI_2;
         let heading = direction + if reverse { std::f64::consts::PI } else { 0.0 };
         let heading = crate::geom::unwrap_near(heading, middle);

@@ -2,6 +2,7 @@
 
 use crate::math::poly::{Piece, PiecewisePoly};
 use crate::math::quadrature::gauss_legendre;
+use crate::math::real;
 
 /// A length is summed to this, metres per cell: far below the 1e-10 m that users of the table may rely on.
 const ARC_TOLERANCE: f64 = 1e-13;
@@ -157,7 +158,7 @@ impl PlaneCurve {
     /// Heading of the tangent at the start, in (-pi, pi].
     pub fn start_heading(&self) -> f64 {
         let [x, y] = self.cells[0].tangent;
-        y.atan2(x)
+        real::atan2(y, x)
     }
 
     /// Where the first piece starts.
@@ -314,7 +315,7 @@ fn turn_rate(piece: &Piece, u: f64) -> f64 {
 
 /// The angle from `a` to `b`, radians.
 fn angle(a: [f64; 2], b: [f64; 2]) -> f64 {
-    cross(a, b).atan2(dot(a, b))
+    real::atan2(cross(a, b), dot(a, b))
 }
 
 fn norm(a: [f64; 2]) -> f64 {

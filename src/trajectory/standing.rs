@@ -1,5 +1,7 @@
 //! Where a polynomial's first derivative vanishes: Bernstein coefficients, halved until their signs are certain.
 
+use crate::math::real;
+
 /// Coefficients below this share of the largest are zero.
 const ZERO: f64 = 1e-13;
 /// Halvings.
@@ -11,7 +13,7 @@ const DEEPEST: usize = 30;
 pub(super) fn standing(coefficients: &[f64], duration: f64) -> Vec<[f64; 2]> {
     // Derivative by the share of the duration.
     let derivative: Vec<f64> =
-        (1..coefficients.len()).map(|k| k as f64 * coefficients[k] * duration.powi(k as i32)).collect();
+        (1..coefficients.len()).map(|k| k as f64 * coefficients[k] * real::powi(duration, k as i32)).collect();
     let bernstein = bernstein(&derivative);
     let scale = bernstein.iter().fold(0.0f64, |scale, c| scale.max(c.abs()));
     if scale <= 0.0 {

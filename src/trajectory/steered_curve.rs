@@ -3,6 +3,7 @@
 use crate::geom::Pose2;
 use crate::math::poly::{Piece, PiecewisePoly};
 use crate::math::quadrature::gauss_legendre_2;
+use crate::math::real;
 
 use super::plane_curve::{CurveError, Place, jet};
 use super::{SteerLeg, standing};
@@ -233,7 +234,7 @@ impl SteeredCurve {
 
     fn with_derivatives(&self, [x, y]: [f64; 2], place: Place) -> [[f64; 3]; 2] {
         let ([yaw, turn, ..], [_, speed, rise, _]) = (self.jet(HEADING, place), self.jet(ADVANCE, place));
-        let (sin, cos) = yaw.sin_cos();
+        let (sin, cos) = real::sin_cos(yaw);
         [[x, speed * cos, rise * cos - speed * turn * sin], [y, speed * sin, rise * sin + speed * turn * cos]]
     }
 
@@ -291,7 +292,7 @@ fn moved(piece: &Piece, from: f64, to: f64) -> [f64; 2] {
 fn velocity(heading: &[f64], advance: &[f64], u: f64) -> [f64; 2] {
     let phi = heading.iter().rev().fold(0.0, |sum, c| sum * u + c);
     let speed = (1..advance.len()).rev().fold(0.0, |sum, k| sum * u + k as f64 * advance[k]);
-    let (sin, cos) = phi.sin_cos();
+    let (sin, cos) = real::sin_cos(phi);
     [speed * cos, speed * sin]
 }
 

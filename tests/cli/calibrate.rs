@@ -8,6 +8,7 @@ use mcap::records::MessageHeader;
 use serde_json::Value;
 use trajc::emit::cdr;
 use trajc::geom::Pose2;
+use trajc::math::real;
 
 use super::sandbox::{Sandbox, golden};
 
@@ -51,7 +52,7 @@ fn header(w: &mut cdr::Writer, time: f64, frame: &str) {
 }
 
 fn place(w: &mut cdr::Writer, pose: Pose2) {
-    let (sin, cos) = (0.5 * pose.yaw).sin_cos();
+    let (sin, cos) = real::sin_cos(0.5 * pose.yaw);
     w.f64_array(&[pose.x, pose.y, 0.0, 0.0, 0.0, sin, cos]);
 }
 

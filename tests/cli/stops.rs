@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use super::sandbox::Sandbox;
+use trajc::math::real;
 
 /// The sandbox's mission with this before its goal.
 fn sandbox_with(line: &str) -> Sandbox {
@@ -44,11 +45,12 @@ fn a_round_is_one_command_file_that_stands_at_every_via() {
         before = time;
         let row = rows.iter().find(|row| (row[0] - time).abs() < 1e-9).expect("a row");
         assert_eq!([row[1], row[2]], [0.0, 0.0]);
-        assert!((row[3] - x).hypot(row[4] - y) < 1e-3, "{row:?}");
-        let turned = |yaw: f64| (row[5] - yaw.to_radians()).sin().abs();
+        assert!(real::hypot(row[3] - x, row[4] - y) < 1e-3, "{row:?}");
+        let turned = |yaw: f64| real::sin(row[5] - yaw.to_radians()).abs();
         assert!(yaw.is_none_or(|yaw| turned(yaw) < 2e-3), "{row:?}");
     }
-    let dwelt = rows.iter().filter(|row| row[1] == 0.0 && row[2] == 0.0 && (row[3] - 2.0).hypot(row[4] - 0.6) < 1e-3);
+    let dwelt =
+        rows.iter().filter(|row| row[1] == 0.0 && row[2] == 0.0 && real::hypot(row[3] - 2.0, row[4] - 0.6) < 1e-3);
     assert_eq!(dwelt.count(), 13, "1.25 s are 13 rows of 0.1 s");
     for file in ["commands.csv", "commands.mcap"] {
         let run = sandbox.run(&["check", &format!("out/a/{file}")]).expect(0);
@@ -130,7 +132,7 @@ fn a_goal_with_a_radius_is_proven_as_that_region() {
     let proof = &report["certificate"];
     let off = proof["end_point_error_m"].as_f64().expect("a number");
     let last = rows(&sandbox, &["x_m", "y_m"]).pop().expect("rows");
-    assert!(off < 0.4 && off > 0.3 && ((last[0] - 3.4).hypot(last[1] - 1.5) - off).abs() < 1e-6, "{off} {last:?}");
+    assert!(off < 0.4 && off > 0.3 && (real::hypot(last[0] - 3.4, last[1] - 1.5) - off).abs() < 1e-6, "{off} {last:?}");
     assert_eq!(proof["goal_within_m"], 0.4);
     let via = proof["vias"][0]["point_error_m"].as_f64().expect("a number");
     assert!(via < 0.2 && via > 0.1, "{via}");

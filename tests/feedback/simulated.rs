@@ -10,6 +10,7 @@ use std::path::Path;
 pub use noise::Noise;
 use trajc::geom::{Pose2, wrap_angle};
 use trajc::inputs::commands::{self, Places};
+use trajc::math::real;
 use trajc::play::Motion;
 use trajc::play::pace::Limits;
 use trajc::play::tracking::tube::Tube;
@@ -85,7 +86,7 @@ pub struct Base {
 impl Base {
     pub fn new(motion: &Motion, fault: Fault) -> Self {
         let (start, table) = (motion.pose(0.0), motion.table());
-        let (sin, cos) = start.yaw.sin_cos();
+        let (sin, cos) = real::sin_cos(start.yaw);
         let [dx, dy, turn] = fault.start;
         let pose = Pose2::new(start.x + cos * dx - sin * dy, start.y + sin * dx + cos * dy, start.yaw + turn);
         let (radius, track) = (table.wheel_radii.mean, table.track_width);

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::*;
 use trajc::geom::Pose2;
+use trajc::math::real;
 
 /// Another domain than a robot's.
 const DOMAIN: u16 = 113;
@@ -147,7 +148,7 @@ struct Odometry {
 /// Odometry of a base in the plane, on a clock of its own.
 fn odometry(pose: Pose2, time: f64) -> Odometry {
     let stamp = Time { sec: 1000 + time as i32, nanosec: (time.fract() * 1e9) as u32 };
-    let (sin, cos) = (0.5 * pose.yaw).sin_cos();
+    let (sin, cos) = real::sin_cos(0.5 * pose.yaw);
     Odometry {
         header: Header { stamp, frame_id: "map".to_owned() },
         child_frame_id: "base_footprint".to_owned(),

@@ -5,6 +5,7 @@ use crate::certify::{Certificate, END_ANGLE_TOLERANCE, END_POINT_TOLERANCE, Refu
 use crate::command::CommandTable;
 use crate::geom::Pose2;
 use crate::map::VoxelMap;
+use crate::math::real;
 use crate::mission::Unknown;
 use crate::robot::{Convex, MotionLimits, RobotModel};
 
@@ -80,8 +81,8 @@ fn the_last_difference_to_rest_counts() {
     table.rows.remove(2); // now from 0.2 m/s to rest at once
     table.rows[2].joint_positions[0] = 0.33;
     task.goal = crate::certify::Goal {
-        x: 1.0 + 0.03 * 0.5f64.cos(),
-        y: 2.0 + 0.03 * 0.5f64.sin(),
+        x: 1.0 + 0.03 * real::cos(0.5),
+        y: 2.0 + 0.03 * real::sin(0.5),
         within: 0.0,
         yaw: None,
         joints: vec![None],
@@ -256,8 +257,8 @@ fn refusals_say_by_how_much_and_when_first() {
     );
     robot.wheel.speed = None;
     robot.joints[0].limits.acceleration = None;
-    task.goal.x += 0.5 * 0.5f64.cos();
-    task.goal.y += 0.5 * 0.5f64.sin();
+    task.goal.x += 0.5 * real::cos(0.5);
+    task.goal.y += 0.5 * real::sin(0.5);
     task.goal.yaw = Some(0.5 - 2.0f64.to_radians());
     task.goal.joints = vec![Some(0.34 + 3.0f64.to_radians())];
     let certificate = certify(&table, &robot, None, &task);

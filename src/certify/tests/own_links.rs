@@ -7,6 +7,7 @@ use super::robots::*;
 use crate::certify::{Certificate, RefusalKind, certify};
 use crate::command::CommandTable;
 use crate::geom::Pose2;
+use crate::math::real;
 use crate::robot::{Convex, RobotModel};
 
 fn refusal(certificate: &Certificate) -> Option<&str> {
@@ -97,7 +98,7 @@ fn an_arm_that_sweeps_over_a_post_between_two_samples_is_found() {
 #[test]
 fn a_gap_of_a_micrometre_is_proven_and_an_overlap_of_one_is_refused() {
     // The arm's end is flat: turning, its corners come to hypot(0.6, 0.005) of the axis; the post's edge is there, give or take.
-    let corner = 0.6f64.hypot(0.005);
+    let corner = real::hypot(0.6, 0.005);
     let swing = [(0.0, 0.0, vec![2.0])];
     assert!(judge(&windmill(corner + 0.01 + 1e-6), &[-0.1], 0.1, &swing).own_links.unwrap().apart);
     assert!(!judge(&windmill(corner + 0.01 - 1e-6), &[-0.1], 0.1, &swing).own_links.unwrap().apart);

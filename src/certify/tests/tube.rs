@@ -9,6 +9,7 @@ use crate::certify::{RefusalKind, Task, certify, trust, tube_along};
 use crate::command::CommandTable;
 use crate::geom::Pose2;
 use crate::map::VoxelMap;
+use crate::math::real;
 use crate::mission::{Tolerance, Unknown};
 use crate::robot::{Convex, RobotModel};
 
@@ -43,7 +44,7 @@ impl Off {
         let [far, direction, heading] = self.start;
         let far = far.abs() * tolerance.start_distance;
         let yaw = start.yaw + heading * tolerance.start_angle;
-        (own, Pose2::new(start.x + far * direction.cos(), start.y + far * direction.sin(), yaw))
+        (own, Pose2::new(start.x + far * real::cos(direction), start.y + far * real::sin(direction), yaw))
     }
 }
 
@@ -436,7 +437,7 @@ fn of_many_random_robots_within_a_certified_tolerance_none_comes_nearer_than_pro
         }
         let (own, from) = off.table(&table, task.start, &tolerance);
         for pose in own.replay(from) {
-            let side = |x: f64, y: f64| (pose.y + x * pose.yaw.sin() + y * pose.yaw.cos()).abs();
+            let side = |x: f64, y: f64| (pose.y + x * real::sin(pose.yaw) + y * real::cos(pose.yaw)).abs();
             let reach = [(0.2, 0.2), (0.2, -0.2), (-0.2, 0.2), (-0.2, -0.2)].map(|(x, y)| side(x, y));
             least = least.min(0.5 - reach.into_iter().fold(0.0, f64::max));
         }

@@ -171,7 +171,9 @@ impl Description {
     }
 
     fn state(&self, state: &State) -> String {
-        let mut out = format!("x {:.4} m, y {:.4} m, yaw {:.4} rad", state.x_m, state.y_m, state.yaw_rad);
+        // Not `-0.0000`.
+        let [x, y, yaw] = [state.x_m, state.y_m, state.yaw_rad].map(|value| (1e4 * value).round() / 1e4 + 0.0);
+        let mut out = format!("x {x:.4} m, y {y:.4} m, yaw {yaw:.4} rad");
         for (joint, value) in self.joints.iter().zip(&state.joints) {
             out += &format!(", {} {value:.4}", joint.name);
         }

@@ -1,6 +1,7 @@
 use super::*;
 use crate::command::limits::{differences, largest_ratio};
 use crate::geom::Pose2;
+use crate::math::real;
 use crate::mission::TimeLaw;
 use crate::retime::{RetimeOptions, retime};
 use crate::robot::{MotionLimits, WheelRadii};
@@ -230,7 +231,7 @@ fn tracked_rows_come_nearer_with_the_third_power_of_the_sampling_time() {
         let holds = [0.05, 0.1, 0.2, 0.5];
         let logs = holds.map(|hold| {
             let (profile, table) = compile(&trajectory, &robot, TimeLaw::Eq5, options(hold, Sampling::Tracked));
-            [hold.ln(), off(&table, &profile)[0].ln()]
+            [real::ln(hold), real::ln(off(&table, &profile)[0])]
         });
         // Slope of the straight line that fits best.
         let mean = [0, 1].map(|i| logs.iter().map(|row| row[i]).sum::<f64>() / logs.len() as f64);

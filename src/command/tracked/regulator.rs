@@ -169,6 +169,7 @@ fn eliminate(mut matrix: [[f64; SIZE]; SIZE], mut vector: [f64; SIZE]) -> Option
 
 #[cfg(test)]
 mod tests {
+    use crate::math::real;
     use nalgebra::{DMatrix, DVector};
 
     use super::*;
@@ -176,7 +177,7 @@ mod tests {
     /// A few rows of a turning drive, unevenly weighed.
     fn rows() -> Vec<Row> {
         let row = |k: usize| {
-            let (sin, cos) = (0.3 * k as f64).sin_cos();
+            let (sin, cos) = real::sin_cos(0.3 * k as f64);
             let by_heading = [-0.05 * sin, 0.05 * cos];
             let aside = 0.5 * 0.1 / 0.4;
             let along = |arm: f64| [0.05 * cos + arm * by_heading[0], 0.05 * sin + arm * by_heading[1]];
@@ -215,16 +216,17 @@ mod tests {
                 let weight = if k as usize + 1 < rows.len() { position } else { end.0[0] };
                 sum += weight * (off[0] * off[0] + off[1] * off[1]);
                 let [left, right] = [0, 1].map(|wheel| correction(k, wheel));
-                sum += row.twist[0] * (0.5 * (left + right)).powi(2) + row.twist[1] * (0.5 * (right - left)).powi(2);
-                sum += (0..2).map(|wheel| row.wheels[wheel][0] * correction(k, wheel).powi(2)).sum::<f64>();
+                sum += row.twist[0] * real::powi(0.5 * (left + right), 2)
+                    + row.twist[1] * real::powi(0.5 * (right - left), 2);
+                sum += (0..2).map(|wheel| row.wheels[wheel][0] * real::powi(correction(k, wheel), 2)).sum::<f64>();
             }
             for k in 0..rows.len() as isize + 2 {
                 for (wheel, at_rest) in rest.iter().enumerate() {
                     let weights =
                         rows.get(k as usize).map_or(*at_rest, |row| [row.wheels[wheel][1], row.wheels[wheel][2]]);
                     let [now, last, before] = [0, 1, 2].map(|back| correction(k - back, wheel));
-                    let first = if k as usize > rows.len() { 0.0 } else { weights[0] * (now - last).powi(2) };
-                    sum += first + weights[1] * (now - 2.0 * last + before).powi(2);
+                    let first = if k as usize > rows.len() { 0.0 } else { weights[0] * real::powi(now - last, 2) };
+                    sum += first + weights[1] * real::powi(now - 2.0 * last + before, 2);
                 }
             }
             let linear = end.1[0] * off[0] + end.1[1] * off[1] + end.1[2] * heading;

@@ -1,6 +1,7 @@
 //! What is read of a message of each type.
 
 use crate::emit::cdr::{CdrError, Reader};
+use crate::math::real;
 
 /// Values of a rotation may be off a unit quaternion about z by this.
 const ROTATION: f64 = 1e-9;
@@ -90,8 +91,8 @@ pub fn pose(r: &mut Reader<'_>) -> Result<[f64; 3], MessageError> {
     })?;
     let [x, y, _, i, j, k, w] = *transforms.first().ok_or(MessageError::Content("no transform"))?;
     all_finite(&[x, y, i, j, k, w])?;
-    if i.hypot(j) > ROTATION || (k.hypot(w) - 1.0).abs() > ROTATION {
+    if real::hypot(i, j) > ROTATION || (real::hypot(k, w) - 1.0).abs() > ROTATION {
         return Err(MessageError::Content("the rotation is no unit quaternion about z"));
     }
-    Ok([x, y, 2.0 * k.atan2(w)])
+    Ok([x, y, 2.0 * real::atan2(k, w)])
 }

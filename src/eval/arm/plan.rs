@@ -2,6 +2,7 @@
 
 use super::super::generate::{CELL, CellBox, metres};
 use super::SIDE;
+use crate::math::real;
 
 /// Cells whose middle a disc's centre may be at, and which of them are joined.
 pub(super) struct Plan {
@@ -26,7 +27,9 @@ impl Plan {
                 |axis: usize, c: i32| (metres(b.min[axis]) - middle(c)).max(middle(c) - metres(b.max[axis])).max(0.0);
             let range = |axis: usize| (b.min[axis] - wide - 1).max(0)..(b.max[axis] + wide + 1).min(SIDE);
             for i in range(0) {
-                range(1).filter(|j| gap(0, i).hypot(gap(1, *j)) < radius).for_each(|j| region[index([i, j])] = 0);
+                range(1)
+                    .filter(|j| real::hypot(gap(0, i), gap(1, *j)) < radius)
+                    .for_each(|j| region[index([i, j])] = 0);
             }
         }
         let mut plan = Self { region };

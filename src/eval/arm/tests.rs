@@ -2,6 +2,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use super::*;
 use crate::eval::scenes::{Scene, SceneSet};
+use crate::math::real;
 use crate::mission::PoseSpec;
 use crate::robot::{self, NoFiles, RobotInputs, spec};
 
@@ -36,7 +37,7 @@ fn surface_is_clear(robot: &RobotModel, set: &SceneSet, scene: &Scene, end: &Pos
     let q: Vec<f64> = robot.joints.iter().map(|j| end.joints[&j.name]).collect();
     let directions = (0..14).flat_map(|i| (0..14).map(move |j| (i, j))).map(|(i, j)| {
         let (turn, tilt) = (f64::from(i) * 0.449, (f64::from(j) / 6.5 - 1.0) * FRAC_PI_2);
-        nalgebra::Vector3::new(turn.cos() * tilt.cos(), turn.sin() * tilt.cos(), tilt.sin())
+        nalgebra::Vector3::new(real::cos(turn) * real::cos(tilt), real::sin(turn) * real::cos(tilt), real::sin(tilt))
     });
     let directions: Vec<_> = directions.collect();
     robot.shapes.iter().zip(robot.shape_poses(&q)).all(|(shape, pose)| {
@@ -69,7 +70,7 @@ fn start_and_goal_are_three_to_eight_metres_apart_and_the_whole_robot_is_clear_t
     assert_eq!((set.clearance, set.resolution), (0.02, 0.05));
     for scene in &set.scenes {
         let ends = [&scene.start, &scene.goal].map(|p| [p.x, p.y].map(|v| v.expect("given")));
-        assert!((3.0..=8.0).contains(&(ends[0][0] - ends[1][0]).hypot(ends[0][1] - ends[1][1])), "{}", scene.id);
+        assert!((3.0..=8.0).contains(&real::hypot(ends[0][0] - ends[1][0], ends[0][1] - ends[1][1])), "{}", scene.id);
         for end in [&scene.start, &scene.goal] {
             assert!(surface_is_clear(&robot, &set, scene, end, FREE), "{}", scene.id);
             let mut arm = robot.clone();

@@ -24,6 +24,7 @@ pub fn end(table: &CommandTable, start: Pose2) -> Pose2 {
 mod tests {
     use super::*;
     use crate::command::CommandRow;
+    use crate::math::real;
     use crate::mission::Sampling;
 
     fn circle(rims: [f64; 2], rows: usize) -> CommandTable {
@@ -52,8 +53,11 @@ mod tests {
             let reached = end(&clipped(&circle(rims, 70), 0.5), start);
             let radius = 0.8 * rims[0].signum() * turn;
             let (from, to) = (start.yaw, start.yaw + turn * 0.2 / 0.4 * 7.0);
-            let expected =
-                Pose2::new(start.x + radius * (to.sin() - from.sin()), start.y - radius * (to.cos() - from.cos()), to);
+            let expected = Pose2::new(
+                start.x + radius * (real::sin(to) - real::sin(from)),
+                start.y - radius * (real::cos(to) - real::cos(from)),
+                to,
+            );
             assert!(reached.distance(expected) < 1e-12 && (reached.yaw - to).abs() < 1e-12, "{reached:?} {expected:?}");
         }
     }

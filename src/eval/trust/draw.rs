@@ -7,6 +7,7 @@ use super::case::{Case, Twist};
 use crate::eval::rng::Rng;
 use crate::geom::Pose2;
 use crate::map::VoxelMap;
+use crate::math::real;
 use crate::mission::Unknown;
 use crate::robot::{
     BaseLimits, Body, BodyMotion, Convex, IgnoreReason, IgnoredPair, MotionLimits, MovingJoint, RobotModel, Shape,
@@ -17,7 +18,7 @@ pub(super) const FREE: MotionLimits = MotionLimits { speed: None, acceleration: 
 
 /// Between two numbers, as many in each decade.
 pub(super) fn decades(rng: &mut Rng, low: f64, high: f64) -> f64 {
-    10f64.powf(rng.uniform(low.log10(), high.log10()))
+    real::powf(10.0, rng.uniform(real::log10(low), real::log10(high)))
 }
 
 pub(super) fn chance(rng: &mut Rng, share: f64) -> bool {

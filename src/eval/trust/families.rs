@@ -10,6 +10,7 @@ use crate::certify::{Goal, Via};
 use crate::eval::rng::Rng;
 use crate::geom::Pose2;
 use crate::map::VoxelMap;
+use crate::math::real;
 use crate::mission::{SpeedZone, Unknown};
 use crate::robot::Convex;
 
@@ -285,7 +286,7 @@ fn goal(rng: &mut Rng) -> Case {
     let goal = &mut case.task.goal;
     match one_of(rng, 4) {
         0 => {
-            let (sin, cos) = rng.uniform(-3.0, 3.0).sin_cos();
+            let (sin, cos) = real::sin_cos(rng.uniform(-3.0, 3.0));
             goal.within = if chance(rng, 0.5) { 0.0 } else { rng.uniform(0.0, 0.1) };
             let off = goal.within.max(point) * (1.0 + excess);
             (goal.x, goal.y) = (goal.x + off * cos, goal.y + off * sin);
@@ -355,7 +356,7 @@ fn zones(rng: &mut Rng) -> Case {
     let off = if chance(rng, 0.5) { off } else { -off };
     let ahead = rng.uniform(-0.5, 0.5);
     let corner = |along: f64, aside: f64| {
-        let (sin, cos) = (at.yaw + ahead).sin_cos();
+        let (sin, cos) = real::sin_cos(at.yaw + ahead);
         [at.x + along * cos - side * aside * sin, at.y + along * sin + side * aside * cos]
     };
     let wide = decades(rng, 0.005, 0.3);

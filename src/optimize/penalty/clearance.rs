@@ -8,6 +8,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use super::Judge;
 use super::own_links::{self, Meeting, OwnLinks};
 use crate::esdf::least_of_points;
+use crate::math::real;
 use crate::optimize::contour::{Contour, Reach};
 use crate::robot::RobotModel;
 
@@ -256,9 +257,9 @@ impl ClearancePenalty {
             pose[4..].copy_from_slice(at.joints);
             return true;
         }
-        let way = (at.position[0] - pose[0]).hypot(at.position[1] - pose[1]);
+        let way = real::hypot(at.position[0] - pose[0], at.position[1] - pose[1]);
         // An angle is less than pi/2 of its chord.
-        let turn = std::f64::consts::FRAC_PI_2 * (at.heading[0] - pose[2]).hypot(at.heading[1] - pose[3]);
+        let turn = std::f64::consts::FRAC_PI_2 * real::hypot(at.heading[0] - pose[2], at.heading[1] - pose[3]);
         let mut near = false;
         for (free, reach) in free.iter_mut().zip(&self.reaches) {
             let mut far = way + reach.radius * turn;
@@ -520,7 +521,7 @@ mod tests {
             penalty.remember(1);
             let joints = [q, 0.1];
             let (mut by_pose, mut by_joints) = (ByPose::default(), [0.0; 2]);
-            let heading = [yaw.cos(), yaw.sin()];
+            let heading = [real::cos(yaw), real::sin(yaw)];
             let judge = &mut Penalise(0.1);
             // Comes from some other place, which it remembers.
             let from = Placement { position: [x + step[0], y + step[1]], heading: [0.6, 0.8], joints: &[q + step[2], 0.0] };

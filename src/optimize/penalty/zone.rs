@@ -2,6 +2,7 @@
 //! nothing of zones, the time law slows them down.
 
 use crate::geom::nearest_in_area;
+use crate::math::real;
 use crate::mission::SpeedZone;
 
 /// What is allowed where.
@@ -24,7 +25,7 @@ impl ZonePenalty {
         let at = |zone: &SpeedZone| {
             let foot = nearest_in_area(place, &zone.polygon);
             let off = [place[0] - foot[0], place[1] - foot[1]];
-            let distance = off[0].hypot(off[1]);
+            let distance = real::hypot(off[0], off[1]);
             let slope = if distance > 0.0 { off.map(|o| 2.0 * self.braking * o / distance) } else { [0.0; 2] };
             (zone.speed * zone.speed + 2.0 * self.braking * distance, slope)
         };
@@ -61,7 +62,7 @@ mod tests {
             let slope = |dx: f64, dy: f64| penalty.square_at([x + dx, y + dy]).expect("zones").1;
             let kink = [(1e-3, 0.0), (-1e-3, 0.0), (0.0, 1e-3), (0.0, -1e-3)].iter().any(|(dx, dy)| {
                 let (a, b) = (slope(*dx, *dy), slope(0.0, 0.0));
-                (a[0] - b[0]).hypot(a[1] - b[1]) > 0.05
+                real::hypot(a[0] - b[0], a[1] - b[1]) > 0.05
             });
             prop_assume!(!kink);
             let numeric = numeric_gradient(square, &[x, y], 1e-5);

@@ -2,6 +2,7 @@
 
 use super::hermite::ORDERS;
 use super::layout::Layout;
+use crate::math::real;
 use crate::optimize::initial::trapezoid;
 use crate::optimize::penalty::Limits;
 use crate::search::{SearchMove, SearchPath};
@@ -194,7 +195,7 @@ pub(super) fn guess(path: &SearchPath, limits: &Limits) -> Option<Guess> {
             if before.direction != after.direction {
                 return None;
             }
-            let half = (0.5 * corner.turn().abs()).tan();
+            let half = real::tan(0.5 * corner.turn().abs());
             let reach = (0.15 + 0.5 * half).min(SHARE * before.length.min(after.length));
             let radius = reach / half.max(1e-6);
             let speed = radius * limits.turn_slope * limits.speed / (1.0 + radius * limits.turn_slope) / 1.5;
@@ -313,10 +314,10 @@ fn assemble(nodes: &[Node], links: &[Link], limits: &Limits) -> Guess {
     let mut speed: Vec<f64> = nodes.iter().map(|n| n.cap).collect();
     (speed[0], speed[pieces]) = (0.0, 0.0);
     for i in 1..=pieces {
-        speed[i] = speed[i].min((speed[i - 1].powi(2) + 2.0 * acceleration * links[i - 1].length).sqrt());
+        speed[i] = speed[i].min((real::powi(speed[i - 1], 2) + 2.0 * acceleration * links[i - 1].length).sqrt());
     }
     for i in (0..pieces).rev() {
-        speed[i] = speed[i].min((speed[i + 1].powi(2) + 2.0 * acceleration * links[i].length).sqrt());
+        speed[i] = speed[i].min((real::powi(speed[i + 1], 2) + 2.0 * acceleration * links[i].length).sqrt());
     }
     let mut x = vec![0.0; layout.size()];
     let mut arc = 0.0;
@@ -349,7 +350,7 @@ fn assemble(nodes: &[Node], links: &[Link], limits: &Limits) -> Guess {
             let change = (nodes[k + 1].joints[j] - nodes[k].joints[j]).abs();
             time = time.max(rest_to_rest(change, joint.speed, joint.acceleration));
         }
-        x[layout.duration(k)] = time.max(0.1).ln();
+        x[layout.duration(k)] = real::ln(time.max(0.1));
     }
     let mut fixed = vec![false; layout.size()];
     for node in [0, pieces] {

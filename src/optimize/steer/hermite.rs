@@ -1,5 +1,7 @@
 //! The quintic piece in unit time, from values and two derivatives at both ends.
 
+use crate::math::real;
+
 /// Data of a piece and dimension: value, first and second derivative in unit time at the start, then at the end.
 pub(super) const DATA: usize = 6;
 /// Derivatives kept at a node, the value included.
@@ -29,7 +31,7 @@ impl Basis {
         for (order, row) in rows.iter_mut().enumerate() {
             for (power, coefficients) in COEFFICIENTS.iter().enumerate().skip(order) {
                 let factor: f64 = (power + 1 - order..=power).map(|k| k as f64).product();
-                let monomial = factor * u.powi((power - order) as i32);
+                let monomial = factor * real::powi(u, (power - order) as i32);
                 for (value, c) in row.iter_mut().zip(coefficients) {
                     *value += monomial * c;
                 }
@@ -94,7 +96,7 @@ mod tests {
             assert!((Basis::new(0.37).at(&data)[order] - numeric).abs() < 1e-7);
         }
         let c = coefficients(&data);
-        let value: f64 = (0..6).map(|k| c[k] * 0.37f64.powi(k as i32)).sum();
+        let value: f64 = (0..6).map(|k| c[k] * real::powi(0.37, k as i32)).sum();
         assert!((Basis::new(0.37).at(&data)[0] - value).abs() < 1e-12);
     }
 
@@ -104,7 +106,8 @@ mod tests {
         let energy = jerk_energy();
         let form: f64 = (0..DATA).map(|i| (0..DATA).map(|j| data[i] * energy[i][j] * data[j]).sum::<f64>()).sum();
         let n = 20000;
-        let direct: f64 = (0..n).map(|k| Basis::new((k as f64 + 0.5) / n as f64).at(&data)[3].powi(2) / n as f64).sum();
+        let direct: f64 =
+            (0..n).map(|k| real::powi(Basis::new((k as f64 + 0.5) / n as f64).at(&data)[3], 2) / n as f64).sum();
         assert!((form / direct - 1.0).abs() < 1e-6);
     }
 }

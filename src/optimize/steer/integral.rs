@@ -5,6 +5,7 @@
 //! anyway.
 
 use super::hermite::{Basis, DATA};
+use crate::math::real;
 
 /// Derivatives by the data of heading, then of arc length.
 pub(super) type ByData = [f64; 2 * DATA];
@@ -78,7 +79,7 @@ impl<'t> Integral<'t> {
 
     /// Goes on to the next sample, with the heading's and the arc length's value and derivatives in unit time.
     pub fn advance(&mut self, basis: &'t Basis, heading: &[f64; 4], arc: &[f64; 4]) {
-        let (sin, cos) = heading[0].sin_cos();
+        let (sin, cos) = real::sin_cos(heading[0]);
         let next = Place { basis, speed: arc[1], acceleration: arc[2], turn: heading[1], sin, cos };
         let Some((first, last)) = self.ends else {
             self.ends = Some((next, next));
@@ -154,10 +155,10 @@ mod tests {
         let exact = run(&data(), &bases(4000)).position();
         let error = |samples: usize| {
             let found = run(&data(), &bases(samples)).position();
-            (found[0] - exact[0]).hypot(found[1] - exact[1])
+            real::hypot(found[0] - exact[0], found[1] - exact[1])
         };
         assert!(error(10) < 1e-5, "{}", error(10));
-        let order = (error(10) / error(20)).log2();
+        let order = real::log2(error(10) / error(20));
         assert!((order - 4.0).abs() < 0.3, "{order}");
     }
 

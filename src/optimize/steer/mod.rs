@@ -19,6 +19,7 @@ use super::penalty::clearance::{ClearancePenalty, DistanceField};
 use super::penalty::zone::ZonePenalty;
 use super::sections::still;
 use crate::math::poly::{Piece, PiecewisePoly};
+use crate::math::real;
 use crate::robot::RobotModel;
 use crate::search::{SearchMove, SearchPath};
 use crate::trajectory::steered_curve::SteeredCurve;
@@ -152,7 +153,7 @@ pub fn optimize_steered<F: DistanceField>(
         let Ok(exact) = SteeredCurve::new(&SteerLeg { pose, curve: curve(layout, &x) }) else { break };
         let end = exact.end_pose();
         let off = [goal.x - end.x, goal.y - end.y];
-        if off[0].hypot(off[1]) <= END_TOLERANCE {
+        if real::hypot(off[0], off[1]) <= END_TOLERANCE {
             break;
         }
         let at = layout.position(layout.pieces);
@@ -188,7 +189,7 @@ fn take_over(layout: Layout, leg: &SteerLeg, fixed: &[bool], x: &mut [f64]) {
         set(layout.position(node), pose.x);
         set(layout.position(node) + 1, pose.y);
         if let Some(piece) = pieces.get(node) {
-            set(layout.duration(node), piece.duration.ln());
+            set(layout.duration(node), real::ln(piece.duration));
             time += piece.duration;
         }
     }
@@ -198,7 +199,7 @@ fn take_over(layout: Layout, leg: &SteerLeg, fixed: &[bool], x: &mut [f64]) {
 fn samples(layout: Layout, piece: usize, x: &[f64], options: &SteerOptions, swing: f64) -> usize {
     let arc = |node: usize| x[layout.state(node, layout::ARC, 0)];
     let length = (arc(piece + 1) - arc(piece)).abs();
-    let time = x[layout.duration(piece)].exp();
+    let time = real::exp(x[layout.duration(piece)]);
     let count = (length.max(swing) / options.sample_distance).max(time / options.sample_time);
     2 * (0.5 * count.clamp(6.0, 40.0)).ceil() as usize
 }
@@ -210,10 +211,10 @@ fn trajectory(leg: Leg, outcome: OptimiserOutcome) -> Trajectory {
 /// The unknowns as polynomials in seconds.
 fn curve(layout: Layout, x: &[f64]) -> PiecewisePoly {
     let piece = |k: usize| {
-        let time = x[layout.duration(k)].exp();
+        let time = real::exp(x[layout.duration(k)]);
         let coefficients = (0..layout.dimensions).map(|dimension| {
             let unit = hermite::coefficients(&layout.data(k, dimension, x, time));
-            unit.iter().enumerate().map(|(power, c)| c / time.powi(power as i32)).collect()
+            unit.iter().enumerate().map(|(power, c)| c / real::powi(time, power as i32)).collect()
         });
         Piece { duration: time, coefficients: coefficients.collect() }
     };

@@ -16,6 +16,7 @@ use super::layout::{ARC, HEADING, Layout};
 use super::local::Local;
 use super::near::Contacts;
 use crate::math::banded::Banded;
+use crate::math::real;
 use crate::optimize::penalty::Limits;
 use crate::optimize::penalty::clearance::{ClearancePenalty, DistanceField};
 use crate::optimize::penalty::zone::ZonePenalty;
@@ -221,7 +222,7 @@ impl<'a, F: DistanceField> Problem<'a, F> {
         let dense = Table::new(LOOKS);
         (0..layout.pieces)
             .map(|piece| {
-                let time = x[layout.duration(piece)].exp();
+                let time = real::exp(x[layout.duration(piece)]);
                 let data = layout.data(piece, ARC, x, time);
                 let speeds = dense.bases.iter().map(|basis| self.directions[piece] * basis.at(&data)[1] / time);
                 -speeds.fold(0.0, f64::min)
@@ -257,7 +258,7 @@ impl<'a, F: DistanceField> Problem<'a, F> {
     /// Data of a piece in unit time; returns its duration.
     pub(super) fn load(&mut self, piece: usize, x: &[f64]) -> f64 {
         let layout = self.layout;
-        let time = x[layout.duration(piece)].exp();
+        let time = real::exp(x[layout.duration(piece)]);
         for (dimension, data) in self.data.iter_mut().enumerate() {
             *data = layout.data(piece, dimension, x, time);
         }
@@ -279,7 +280,7 @@ impl<'a, F: DistanceField> Problem<'a, F> {
         self.local.clear();
         self.local.add_time(time, time);
         let mut cost = time + self.jerks(time);
-        let short = SHORTEST.ln() - x[layout.duration(piece)];
+        let short = real::ln(SHORTEST) - x[layout.duration(piece)];
         if short > 0.0 {
             cost += 0.5 * self.weights.motion * short * short;
             self.local.add_time(-self.weights.motion * short, self.weights.motion);

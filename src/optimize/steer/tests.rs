@@ -4,6 +4,7 @@ use super::problem::{Derivatives, Problem, STIFFNESS, Weights};
 use super::*;
 use crate::geom::Pose2;
 use crate::math::fd::{numeric_gradient, relative_error};
+use crate::math::real;
 use crate::mission::SpeedZone;
 use crate::optimize::penalty::clearance::PointOf;
 use crate::optimize::test_robot::{Boxes, arm, robot};
@@ -174,7 +175,7 @@ fn the_hessian_is_that_of_the_squares_where_all_limits_are_kept() {
     let mut problem = problem(&robot, &field, &first);
     let mut x = first.x.clone();
     // Long pieces: nothing is fast.
-    (0..first.layout.pieces).for_each(|k| x[first.layout.duration(k)] = 20f64.ln());
+    (0..first.layout.pieces).for_each(|k| x[first.layout.duration(k)] = real::ln(20.0));
     for node in 1..first.layout.pieces {
         x[first.layout.state(node, 1, 1)] = 0.07 - 0.01 * node as f64;
         x[first.layout.state(node, 0, 2)] = 1e-4;

@@ -5,6 +5,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::command::CommandTable;
 use crate::geom::Pose2;
+use crate::math::real;
 use crate::play::fixtures::{drive, ready, smooth, table, tight_robot};
 use crate::play::motion::{slowed, speed};
 
@@ -25,7 +26,7 @@ fn off_the_path(motion: &Motion, stop: &Stop) -> (f64, f64) {
     let poses = table.replay(motion.pose(stop.path_times[0]));
     let off = poses.iter().zip(&stop.path_times).map(|(is, time)| {
         let planned = motion.pose(*time);
-        let aside = (is.y - planned.y) * planned.yaw.cos() - (is.x - planned.x) * planned.yaw.sin();
+        let aside = (is.y - planned.y) * real::cos(planned.yaw) - (is.x - planned.x) * real::sin(planned.yaw);
         (aside.abs(), (is.yaw - planned.yaw).abs())
     });
     off.fold((0.0, 0.0), |(d, a): (f64, f64), (distance, angle)| (d.max(distance), a.max(angle)))

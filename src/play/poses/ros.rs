@@ -135,6 +135,7 @@ impl Frames {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::real;
     use crate::trajectory::fixtures;
 
     fn at(sec: i32, frame: &str) -> Header {
@@ -143,7 +144,7 @@ mod tests {
 
     /// A pose in the plane, turned by an angle about z.
     fn flat(x: f64, y: f64, yaw: f64) -> [f64; 7] {
-        [x, y, 0.0, 0.0, 0.0, (0.5 * yaw).sin(), (0.5 * yaw).cos()]
+        [x, y, 0.0, 0.0, 0.0, real::sin(0.5 * yaw), real::cos(0.5 * yaw)]
     }
 
     fn edge(sec: i32, parent: &str, child: &str, transform: [f64; 7]) -> TransformStamped {

@@ -28,6 +28,7 @@
 //! and a saturated loop overshoots whatever its margins say.
 
 use crate::geom::{Pose2, sinc, wrap_angle};
+use crate::math::real;
 
 /// Damping, `zeta`.
 const DAMPING: f64 = 0.9;
@@ -64,7 +65,7 @@ pub struct Error {
 
 /// The reference as the robot sees it.
 pub fn error(reference: Pose2, robot: Pose2) -> Error {
-    let (sin, cos) = robot.yaw.sin_cos();
+    let (sin, cos) = real::sin_cos(robot.yaw);
     let (dx, dy) = (reference.x - robot.x, reference.y - robot.y);
     Error { along: cos * dx + sin * dy, across: cos * dy - sin * dx, heading: wrap_angle(reference.yaw - robot.yaw) }
 }
@@ -86,7 +87,7 @@ impl Default for Gains {
 impl Gains {
     /// For wheels that have so much acceleration (m/s^2) and jerk (m/s^3) of the rim left for corrections.
     pub fn within(acceleration: f64, jerk: f64) -> Self {
-        let gain = (acceleration / USUAL).sqrt().min((jerk / USUAL).cbrt());
+        let gain = (acceleration / USUAL).sqrt().min(real::cbrt(jerk / USUAL));
         Self { fastest: (gain / (2.0 * DAMPING)).min(FASTEST) }
     }
 }
@@ -96,11 +97,11 @@ pub fn twist(gains: Gains, error: Error, reference: Twist) -> Twist {
     let Twist { speed, turn_rate } = reference;
     let Gains { fastest } = gains;
     // Fast references: as stiff as the fastest loop allows.
-    let stiffness = STIFFNESS.min((fastest / speed.abs().max(1e-9)).powi(2));
+    let stiffness = STIFFNESS.min(real::powi(fastest / speed.abs().max(1e-9), 2));
     let natural = (turn_rate * turn_rate + stiffness * speed * speed + FLOOR * FLOOR).sqrt().min(fastest);
     let gain = 2.0 * DAMPING * natural;
     Twist {
-        speed: speed * error.heading.cos() + gain * error.along,
+        speed: speed * real::cos(error.heading) + gain * error.along,
         turn_rate: turn_rate + stiffness * speed * sinc(error.heading) * error.across + gain * error.heading,
     }
 }
@@ -117,7 +118,7 @@ mod tests {
 
     /// The error after driving a law for so long from an error, each command held for `hold` and late by `late` holds.
     fn driven(start: Error, reference: Twist, hold: f64, late: usize, time: f64) -> Error {
-        let (sin, cos) = (-start.heading).sin_cos();
+        let (sin, cos) = real::sin_cos(-start.heading);
         let (x, y) = (cos * start.along - sin * start.across, sin * start.along + cos * start.across);
         let (mut robot, mut there) = (Pose2::new(-x, -y, -start.heading), Pose2::default());
         let mut waiting = std::collections::VecDeque::from(vec![reference; late]);
@@ -131,7 +132,7 @@ mod tests {
     }
 
     fn size(e: Error) -> f64 {
-        e.along.hypot(e.across).hypot(e.heading)
+        real::hypot(real::hypot(e.along, e.across), e.heading)
     }
 
     const STARTS: [Error; 3] = [
@@ -150,14 +151,18 @@ mod tests {
     #[test]
     fn the_potential_falls_by_what_the_proof_says() {
         // Below the fastest loop, where the stiffness is constant.
-        let potential = |e: Error| 0.5 * (e.along.powi(2) + e.across.powi(2)) + 0.5 * e.heading.powi(2) / STIFFNESS;
+        let potential = |e: Error| {
+            0.5 * (real::powi(e.along, 2) + real::powi(e.across, 2)) + 0.5 * real::powi(e.heading, 2) / STIFFNESS
+        };
         for reference in REFERENCES.into_iter().filter(|r| r.speed.abs() < 0.5) {
             for start in STARTS {
                 let step = 1e-6;
                 let after = driven(start, reference, step, 0, 1.5 * step);
-                let n2 = reference.turn_rate.powi(2) + STIFFNESS * reference.speed.powi(2) + FLOOR.powi(2);
+                let n2 = real::powi(reference.turn_rate, 2)
+                    + STIFFNESS * real::powi(reference.speed, 2)
+                    + real::powi(FLOOR, 2);
                 let gain = 2.0 * DAMPING * n2.sqrt().min(FASTEST);
-                let falls = gain * (start.along.powi(2) + start.heading.powi(2) / STIFFNESS);
+                let falls = gain * (real::powi(start.along, 2) + real::powi(start.heading, 2) / STIFFNESS);
                 let found = (potential(start) - potential(after)) / step;
                 assert!((found - falls).abs() < 1e-4 * (1.0 + falls), "{reference:?} {start:?}: {found} {falls}");
             }
@@ -179,7 +184,7 @@ mod tests {
         // Gain one where u = (w/n)^2 solves 4 zeta^2 u + 1 = u^2; the phase left there, over the frequency.
         let z2 = DAMPING * DAMPING;
         let frequency = (2.0 * z2 + (4.0 * z2 * z2 + 1.0).sqrt()).sqrt();
-        let lateral = (2.0 * DAMPING * frequency).atan() / frequency;
+        let lateral = real::atan(2.0 * DAMPING * frequency) / frequency;
         let along = std::f64::consts::FRAC_PI_2 / (2.0 * DAMPING);
         assert!((MARGIN - lateral.min(along)).abs() < 0.01, "{lateral} {along}");
     }

@@ -20,6 +20,7 @@ use std::collections::VecDeque;
 use crate::command::CommandRow;
 use crate::command::limits::differences;
 use crate::geom::Pose2;
+use crate::math::real;
 use crate::play::motion::Motion;
 use crate::play::pace::Limits;
 use crate::robot::RobotModel;
@@ -208,8 +209,9 @@ impl<'a> Tracker<'a> {
         let rows = table.rows.len() as isize;
         let fastest = bounds.iter().enumerate().map(|(actuator, limits)| {
             let peaks = differences((0..rows).map(|k| motion.speed(actuator, k)), hold);
-            let pace =
-                |order: usize| ((1.0 - RESERVE[order]) * limits[order] / peaks[order]).powf(1.0 / (order + 1) as f64);
+            let pace = |order: usize| {
+                real::powf((1.0 - RESERVE[order]) * limits[order] / peaks[order], 1.0 / (order + 1) as f64)
+            };
             pace(0).min(pace(1)).min(pace(2))
         });
         let fastest = fastest.fold(1.0, f64::min);

@@ -14,6 +14,7 @@ use std::collections::VecDeque;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use crate::geom::{Pose2, wrap_angle};
+use crate::math::real;
 
 /// Standard deviations of the wheels' radii about their common mean's own, of that mean, and of the track, before anything was seen.
 const DIFFERENCE: f64 = 0.003;
@@ -89,9 +90,10 @@ pub struct Observer {
 impl Observer {
     /// From a first pose.
     pub fn new(drive: &Drive, time: f64, pose: Pose2) -> Self {
-        let (n2, t2) = (drive.noise.powi(2), drive.turn_noise.powi(2));
-        let (scale, apart) = (SCALE.powi(2), DIFFERENCE.powi(2));
-        let diagonal = [n2, n2, t2, scale + 0.25 * apart, scale + 0.25 * apart, TRACK.powi(2), LATE.powi(2)];
+        let (n2, t2) = (real::powi(drive.noise, 2), real::powi(drive.turn_noise, 2));
+        let (scale, apart) = (real::powi(SCALE, 2), real::powi(DIFFERENCE, 2));
+        let diagonal =
+            [n2, n2, t2, scale + 0.25 * apart, scale + 0.25 * apart, real::powi(TRACK, 2), real::powi(LATE, 2)];
         let mut covariance = Covariance::from_diagonal(&State::from(diagonal));
         // Radii that differ in common mean by SCALE, from each other by DIFFERENCE.
         covariance[(3, 4)] = scale - 0.25 * apart;
@@ -140,7 +142,7 @@ impl Observer {
         let to = from.after_twist(speed, rate, time);
         // Derivatives: of the pose by pose, exact; by speed and rate, exact in speed, of a chord's middle in rate.
         let (dx, dy) = (to.x - from.x, to.y - from.y);
-        let (sin, cos) = (from.yaw + 0.5 * rate * time).sin_cos();
+        let (sin, cos) = real::sin_cos(from.yaw + 0.5 * rate * time);
         let by_speed = Vector3::new(time * cos, time * sin, 0.0);
         let by_rate = Vector3::new(-0.5 * time * dy, 0.5 * time * dx, time);
         let mut jacobian = Covariance::identity();
@@ -155,8 +157,9 @@ impl Observer {
         jacobian.fixed_view_mut::<3, 1>(0, 5).copy_from(&(by_rate * (-rate / (1.0 + shares.track))));
         self.covariance = jacobian * self.covariance * jacobian.transpose();
         let way = speed.abs() * time;
-        let place = SLIP.powi(2) * way + CREEP.0.powi(2) * time;
-        let turn = TURN_SLIP.powi(2) * (way + drive.track_width * rate.abs() * time) + CREEP.1.powi(2) * time;
+        let place = real::powi(SLIP, 2) * way + real::powi(CREEP.0, 2) * time;
+        let turn =
+            real::powi(TURN_SLIP, 2) * (way + drive.track_width * rate.abs() * time) + real::powi(CREEP.1, 2) * time;
         for (k, noise) in [place, place, turn].into_iter().enumerate() {
             self.covariance[(k, k)] += noise;
         }
@@ -219,7 +222,7 @@ impl Observer {
         let wheels = then.checked_sub(1).map_or([0.0; 2], |k| history[k].wheels);
         let (speed, rate) = self.twist(drive, wheels);
         let back = self.pose().after_twist(speed, rate, -late);
-        let (sin, cos) = back.yaw.sin_cos();
+        let (sin, cos) = real::sin_cos(back.yaw);
         (back, Vector3::new(-speed * cos, -speed * sin, -rate))
     }
 

@@ -2,6 +2,7 @@
 
 use super::law::error;
 use crate::geom::Pose2;
+use crate::math::real;
 use crate::play::motion::Motion;
 
 /// Seconds of path behind the reference that a robot that lags may be at.
@@ -65,7 +66,7 @@ impl Tube {
                 let at = at.max(0.0);
                 let off = error(motion.pose(at / motion.table().sampling_time), robot);
                 let room = self.room(at);
-                let moved = off.along.hypot(off.across) + self.reach * off.heading.abs();
+                let moved = real::hypot(off.along, off.across) + self.reach * off.heading.abs();
                 (moved / room.metres).max(off.heading.abs() / room.radians)
             })
             .fold(f64::INFINITY, f64::min)
@@ -95,7 +96,7 @@ mod tests {
         let (time, behind) = (4.0, motion.pose(350.0));
         assert!(tube.filled(&motion, time, behind) < 0.02, "half a second late");
         let place = motion.pose(400.0);
-        let (sin, cos) = place.yaw.sin_cos();
+        let (sin, cos) = real::sin_cos(place.yaw);
         let aside = |d: f64| Pose2::new(place.x - d * sin, place.y + d * cos, place.yaw);
         assert!((tube.filled(&motion, time, aside(0.05)) - 0.5).abs() < 0.02);
         assert!(tube.filled(&motion, time, aside(0.12)) > 1.0);

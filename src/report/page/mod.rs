@@ -24,6 +24,7 @@ use super::Report;
 use crate::certify::{self, Instant, Trust};
 use crate::command::CommandTable;
 use crate::map::VoxelMap;
+use crate::math::real;
 use crate::mission::{PoseSpec, SpeedZone};
 use crate::robot::{Convex, RobotModel};
 
@@ -173,7 +174,7 @@ fn figure(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return if value == 0.0 { "0".into() } else { "–".into() };
     }
-    let digits = (3 - value.abs().log10().floor() as i32).clamp(0, 6) as usize;
+    let digits = (3 - real::log10(value.abs()).floor() as i32).clamp(0, 6) as usize;
     let text = format!("{value:.digits$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     let text = if text.trim_start_matches('-') == "0" { "0" } else { text };

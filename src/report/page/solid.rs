@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 use serde::Serialize;
 
+use crate::math::real;
 use crate::robot::{Convex, hull};
 
 /// Sides of a drawn cylinder.
@@ -65,7 +66,7 @@ fn corners(convex: &Convex, most: usize) -> Vec<[f64; 3]> {
         }
         Convex::Cylinder { radius, half_length } => (0..2 * SIDES)
             .map(|k| {
-                let (sin, cos) = (std::f64::consts::TAU * (k / 2) as f64 / SIDES as f64).sin_cos();
+                let (sin, cos) = real::sin_cos(std::f64::consts::TAU * (k / 2) as f64 / SIDES as f64);
                 [radius * cos, radius * sin, if k % 2 == 0 { -half_length } else { *half_length }]
             })
             .collect(),
@@ -85,7 +86,7 @@ fn spiral(count: usize) -> impl Iterator<Item = Vector3<f64>> {
     (0..count).map(move |i| {
         let z = 1.0 - (2.0 * i as f64 + 1.0) / count as f64;
         // The golden angle.
-        let (sin, cos) = (2.399_963_229_728_653 * i as f64).sin_cos();
+        let (sin, cos) = real::sin_cos(2.399_963_229_728_653 * i as f64);
         let radius = (1.0 - z * z).sqrt();
         Vector3::new(radius * cos, radius * sin, z)
     })
@@ -100,7 +101,7 @@ fn creases(points: &[[f64; 3]], triangles: &[[usize; 3]]) -> Vec<usize> {
         let [a, b, c] = *corners;
         normals.extend([((a, b), normal), ((b, c), normal), ((c, a), normal)]);
     }
-    let least = CREASE.to_radians().cos();
+    let least = real::cos(CREASE.to_radians());
     let turns = |(a, b): &(usize, usize), normal: &Vector3<f64>| {
         a < b && normals.get(&(*b, *a)).is_none_or(|other| normal.dot(other) < least)
     };

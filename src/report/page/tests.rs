@@ -8,6 +8,7 @@ use crate::certify::{Goal, Task, certify};
 use crate::command::CommandRow;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::geom::Pose2;
+use crate::math::real;
 use crate::mission::{Sampling, Tolerance, Unknown};
 use crate::report::schema::{InputFile, InputsPart, TrustPart};
 use crate::report::{Metrics, PathErrorRow};
@@ -77,7 +78,7 @@ fn table(robot: &RobotModel, rows: usize) -> CommandTable {
     let step = 0.1;
     let mut pose = Pose2::new(0.5, 1.0, 0.3);
     let mut joints = vec![0.0; robot.joints.len()];
-    let wave = |k: usize| if k + 1 < rows { (std::f64::consts::PI * k as f64 / rows as f64).sin() } else { 0.0 };
+    let wave = |k: usize| if k + 1 < rows { real::sin(std::f64::consts::PI * k as f64 / rows as f64) } else { 0.0 };
     let mut table = CommandTable {
         sampling_time: step,
         sampling: Sampling::Mean,
@@ -88,7 +89,7 @@ fn table(robot: &RobotModel, rows: usize) -> CommandTable {
     };
     for k in 0..rows {
         let (left, right) = (0.3 * wave(k), 0.33 * wave(k));
-        let rate = 0.4 * wave(k) * (k as f64 * 0.2).cos();
+        let rate = 0.4 * wave(k) * real::cos(k as f64 * 0.2);
         let velocities = vec![rate; joints.len()];
         table.rows.push(CommandRow {
             wheel_left: left / robot.wheel_radii.mean,
@@ -428,7 +429,7 @@ fn pages_of_long_missions_on_rough_maps_stay_below_a_megabyte_and_say_what_they_
     let vertices: Vec<[f64; 3]> = (0..1000)
         .map(|i| {
             let (a, b) = (f64::from(i) * 2.399, f64::from(i) / 1000.0 * 2.0 - 1.0);
-            [fine.x * a.cos() * (1.0 - b * b).sqrt(), fine.y * a.sin() * (1.0 - b * b).sqrt(), fine.z * b]
+            [fine.x * real::cos(a) * (1.0 - b * b).sqrt(), fine.y * real::sin(a) * (1.0 - b * b).sqrt(), fine.z * b]
         })
         .collect();
     for joint in 0..10 {
@@ -456,7 +457,7 @@ fn the_tube_is_drawn_to_scale_and_its_width_against_the_way_driven() {
     let page = case.page();
     let trust = case.trust.as_ref().expect("commands that can be replayed");
     for (point, outline) in trust.tube.iter().map(|point| (point, trust::outline(point))) {
-        let far = |p: &[f64; 2]| (p[0] - point.place[0]).hypot(p[1] - point.place[1]);
+        let far = |p: &[f64; 2]| real::hypot(p[0] - point.place[0], p[1] - point.place[1]);
         let most = outline.iter().map(far).fold(0.0, f64::max);
         assert!(
             most <= point.width.distance + 1e-12 && most > 0.9 * point.width.distance,

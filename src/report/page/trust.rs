@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use super::html::{escape, section};
 use super::{PageInputs, figure};
 use crate::certify::{Trust, TubePoint};
+use crate::math::real;
 use crate::report::plot::svg::{Area, Svg};
 use crate::report::plot::{Chart, Join, Small, TopView, place};
 use crate::report::schema::TrustPart;
@@ -24,7 +25,7 @@ const WIDTH: f64 = 760.0;
 /// Where the base can be when the model's is at a point of its path: the outline, m.
 pub(in crate::report) fn outline(point: &TubePoint) -> Vec<[f64; 2]> {
     let corner = |k: usize| {
-        let (sin, cos) = (TAU * k as f64 / CORNERS as f64).sin_cos();
+        let (sin, cos) = real::sin_cos(TAU * k as f64 / CORNERS as f64);
         let mut at = [point.place[0] + point.anywhere * cos, point.place[1] + point.anywhere * sin];
         for [x, y] in point.drift {
             let side = if x * cos + y * sin < 0.0 { -1.0 } else { 1.0 };

@@ -1,5 +1,7 @@
 //! The foot of a point on a curve.
 
+use crate::math::real;
+
 /// A step along the path that changes no distance that anyone reads, m.
 const NO_STEP: f64 = 1e-11;
 
@@ -16,7 +18,7 @@ pub(super) fn distance_to_curve(
     for _ in 0..40 {
         let [x, y] = jets(u);
         let offset = [x[0] - point[0], y[0] - point[1]];
-        best = best.min(offset[0].hypot(offset[1]));
+        best = best.min(real::hypot(offset[0], offset[1]));
         let slope = offset[0] * x[1] + offset[1] * y[1];
         let bend = x[1] * x[1] + y[1] * y[1] + offset[0] * x[2] + offset[1] * y[2];
         if slope > 0.0 {

@@ -3,6 +3,7 @@
 use std::cell::OnceCell;
 
 use crate::geom::Pose2;
+use crate::math::real;
 use crate::retime::MotionProfile;
 use crate::retime::course::Course;
 use crate::trajectory::plane_curve::{Place, PlaneCurve};
@@ -62,7 +63,7 @@ impl PathReference {
         for (index, course) in courses.iter().enumerate() {
             // Position with its derivatives by a parameter that goes forward, and the distance driven on this course.
             let mut add = |[x, y]: [[f64; 3]; 2], place, along: f64| {
-                let speed = x[1].hypot(y[1]);
+                let speed = real::hypot(x[1], y[1]);
                 let about = About {
                     direction: [x[1] / speed, y[1] / speed],
                     curvature: (x[1] * y[2] - y[1] * x[2]) / (speed * speed * speed),
@@ -108,7 +109,7 @@ impl PathReference {
                     for i in 0..=steps as usize {
                         let share = i as f64 / steps;
                         let pose = p.pose(share);
-                        let (sin, cos) = pose.yaw.sin_cos();
+                        let (sin, cos) = real::sin_cos(pose.yaw);
                         let jets = [[pose.x, p.drive * cos, 0.0], [pose.y, p.drive * sin, 0.0]];
                         add(jets, Place { piece: 0, u: share }, p.drive.abs() * share);
                     }
@@ -215,7 +216,7 @@ impl PathReference {
                 near.min(distance_to_curve(jets, [low, own, high], point))
             }
             Course::Proportional(p) if p.drive != 0.0 => {
-                let (sin, cos) = p.pose.yaw.sin_cos();
+                let (sin, cos) = real::sin_cos(p.pose.yaw);
                 let offset = [point[0] - p.pose.x, point[1] - p.pose.y];
                 let along = offset[0] * cos + offset[1] * sin;
                 let inside = along * p.drive.signum() >= 0.0 && along.abs() <= p.drive.abs();
@@ -254,7 +255,7 @@ fn smooth_out(vertices: &mut [Vertex]) {
             let second = (after - before) / (0.5 * (back + ahead));
             let change = [before + (after - before) * back / (back + ahead), second];
             // The fourth order halfway to the next vertex, as a measure of what is left out beyond it.
-            let fourth = second.abs() * back.max(ahead).powi(4) / 384.0;
+            let fourth = second.abs() * real::powi(back.max(ahead), 4) / 384.0;
             (fourth <= FOURTH_ORDER).then_some(About { change, ..about })
         });
     }
@@ -356,5 +357,5 @@ impl Cells {
 }
 
 pub(super) fn square(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2)
+    real::powi(a[0] - b[0], 2) + real::powi(a[1] - b[1], 2)
 }

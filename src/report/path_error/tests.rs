@@ -1,5 +1,6 @@
 use super::*;
 use crate::math::poly::{Piece, PiecewisePoly};
+use crate::math::real;
 use crate::mission::TimeLaw;
 use crate::retime::{RetimeOptions, retime};
 use crate::trajectory::{Leg, SteerLeg, Trajectory, TrajectorySource, fixtures, given};
@@ -26,7 +27,7 @@ fn lateral_and_end_point_error_fall_with_the_square_of_the_sampling_time() {
     for curve in [C_CURVE, S_CURVE] {
         for sampling in [Sampling::Mean, Sampling::Instant] {
             let [coarse, fine] = [0.2, 0.05].map(|time| plain(&[curve], sampling, time));
-            let order = |coarse: f64, fine: f64| (coarse / fine).log2() / 2.0;
+            let order = |coarse: f64, fine: f64| real::log2(coarse / fine) / 2.0;
             assert!((order(coarse.lateral_max, fine.lateral_max) - 2.0).abs() < 0.15, "{coarse:?} {fine:?}");
             assert!((order(coarse.end_point, fine.end_point) - 2.0).abs() < 0.15, "{coarse:?} {fine:?}");
         }
@@ -64,7 +65,7 @@ fn positions(profile: &MotionProfile) -> Vec<[f64; 2]> {
 }
 
 fn nearest(positions: &[[f64; 2]], point: [f64; 2]) -> f64 {
-    positions.iter().map(|p| (p[0] - point[0]).hypot(p[1] - point[1])).fold(f64::INFINITY, f64::min)
+    positions.iter().map(|p| real::hypot(p[0] - point[0], p[1] - point[1])).fold(f64::INFINITY, f64::min)
 }
 
 #[test]
@@ -98,7 +99,7 @@ fn steered(rows: &[[f64; 3]]) -> (MotionProfile, RobotModel) {
         let step = |d: usize| {
             let mut c = vec![at[d], 0.0, 0.0, 0.0];
             let powers = [35.0, -84.0, 70.0, -20.0].iter().enumerate();
-            c.extend(powers.map(|(k, a)| changes[d] * a / seconds.powi(4 + k as i32)));
+            c.extend(powers.map(|(k, a)| changes[d] * a / real::powi(*seconds, 4 + k as i32)));
             c
         };
         let coefficients = vec![step(0), step(1)];
@@ -156,7 +157,7 @@ fn looking_along_the_path_finds_its_own_stretch_or_what_is_nearer() {
                     travelled += next.distance(before);
                     before = next;
                 }
-                let (sin, cos) = (1.1 * f64::from(i)).sin_cos();
+                let (sin, cos) = real::sin_cos(1.1 * f64::from(i));
                 let point = [pose.x + aside * cos, pose.y + aside * sin];
                 let along = reference.distance_along(point, travelled, &mut cursor);
                 let everywhere = reference.distance(point);
@@ -188,7 +189,7 @@ fn an_arc_at_constant_curvature_is_no_error_and_a_clothoid_leaves_what_one_arc_m
             let length = rows[i].pose.distance(rows[j].pose);
             ((rows[j].pose.yaw - rows[i].pose.yaw) / length, length)
         });
-        if a.1.min(b.1) < 1e-4 { 0.0 } else { ((b.0 - a.0) / (0.5 * (a.1 + b.1))).abs() * a.1.max(b.1).powi(3) }
+        if a.1.min(b.1) < 1e-4 { 0.0 } else { ((b.0 - a.0) / (0.5 * (a.1 + b.1))).abs() * real::powi(a.1.max(b.1), 3) }
     });
     let least = least.fold(0.0, f64::max) / (72.0 * 3f64.sqrt());
     assert!((0.97..1.03).contains(&(row.lateral_max / least)), "{} {least}", row.lateral_max);
@@ -200,7 +201,7 @@ fn tracked_commands_leave_the_path_by_less_than_a_third_of_the_others_and_with_t
         let (profile, robot) = profile(&[curve]);
         let all = [Sampling::Tracked, Sampling::Instant, Sampling::Mean];
         let rows = path_errors(&profile, &robot, &[0.05, 0.2], &all, |_| None).unwrap();
-        let order = (rows[1].lateral_max / rows[0].lateral_max).log2() / 2.0;
+        let order = real::log2(rows[1].lateral_max / rows[0].lateral_max) / 2.0;
         assert!((order - 3.0).abs() < 0.1, "{order}");
         for (k, row) in rows.iter().enumerate().skip(2) {
             assert!(3.0 * rows[k % 2].lateral_max < row.lateral_max && rows[k % 2].end_point < 1e-6);

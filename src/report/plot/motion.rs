@@ -91,6 +91,7 @@ pub fn radius_chart(table: &CommandTable) -> Chart {
 mod tests {
     use super::*;
     use crate::command::CommandRow;
+    use crate::math::real;
     use crate::mission::Sampling;
     use crate::report::plot::{Figure, Panel};
 
@@ -144,6 +145,6 @@ mod tests {
         let states = states(&table);
         let end = states[3].0;
         let yaw = 2.0 * 0.1 * 0.2 / 0.32;
-        assert!((end.yaw - yaw).abs() < 1e-12 && (end.x - 1.0 - 0.02 * yaw.cos()).abs() < 1e-12);
+        assert!((end.yaw - yaw).abs() < 1e-12 && (end.x - 1.0 - 0.02 * real::cos(yaw)).abs() < 1e-12);
     }
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use crate::geom::Pose2;
+use crate::math::real;
 use crate::robot::RobotModel;
 
 /// Directions in which a shape's outline is looked for.
@@ -76,10 +77,10 @@ pub(super) fn of_robot(robot: &RobotModel, pose: Pose2, q: &[f64]) -> Vec<Part> 
         let mut outline: Vec<[f64; 2]> = Vec::new();
         for k in 0..DIRECTIONS {
             // Half a step off the axes: a box's corners are found, not any point of its sides.
-            let (sin, cos) = (std::f64::consts::TAU * (k as f64 + 0.5) / DIRECTIONS as f64).sin_cos();
+            let (sin, cos) = real::sin_cos(std::f64::consts::TAU * (k as f64 + 0.5) / DIRECTIONS as f64);
             let direction = map_from_shape.rotation.inverse() * Vector3::new(cos, sin, 0.0);
             let p = map_from_shape * nalgebra::Point3::from(shape.convex.support(&direction));
-            if outline.last().is_none_or(|l| (l[0] - p.x).hypot(l[1] - p.y) > 1e-6) {
+            if outline.last().is_none_or(|l| real::hypot(l[0] - p.x, l[1] - p.y) > 1e-6) {
                 outline.push([p.x, p.y]);
             }
         }

@@ -2,6 +2,7 @@
 
 use super::{TopView, top};
 use crate::geom::Pose2;
+use crate::math::real;
 use crate::mission::{PoseSpec, SpeedZone};
 use crate::robot::RobotModel;
 
@@ -43,7 +44,7 @@ pub fn zones(view: &mut TopView, zones: &[SpeedZone]) {
 /// Draws the places that a goal or via with `within_m` allows.
 fn region(view: &mut TopView, [x, y]: [f64; 2], within: f64) {
     let corner = |k: usize| {
-        let (sin, cos) = (std::f64::consts::TAU * k as f64 / CORNERS as f64).sin_cos();
+        let (sin, cos) = real::sin_cos(std::f64::consts::TAU * k as f64 / CORNERS as f64);
         [x + within * cos, y + within * sin]
     };
     view.area((0..CORNERS).map(corner).collect(), 2, "any place will do");

@@ -1,5 +1,7 @@
 //! From values to places on an axis, and the round numbers beside it.
 
+use crate::math::real;
+
 /// How values are spread over an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Spread {
@@ -29,8 +31,8 @@ impl Scale {
         let (low, high) = seen.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         if logarithmic {
             let (low, high) = if low > high { (1.0, 10.0) } else { (low.max(1e-6 * high), high) };
-            let [low, high] = [low.log10().floor(), (high.log10() + 1e-9).ceil()];
-            return Self { low: 10f64.powf(low), high: 10f64.powf(high.max(low + 1.0)), spread };
+            let [low, high] = [real::log10(low).floor(), (real::log10(high) + 1e-9).ceil()];
+            return Self { low: real::powf(10.0, low), high: real::powf(10.0, high.max(low + 1.0)), spread };
         }
         let (low, high) = if low > high { (0.0, 1.0) } else { (low, high) };
         let room = if high > low { 0.06 * (high - low) } else { 0.5 * high.abs().max(1.0) };
@@ -46,7 +48,7 @@ impl Scale {
     pub fn share(&self, value: f64) -> f64 {
         match self.spread {
             Spread::Linear => (value - self.low) / (self.high - self.low),
-            Spread::Logarithmic => (value / self.low).log10() / (self.high / self.low).log10(),
+            Spread::Logarithmic => real::log10(value / self.low) / real::log10(self.high / self.low),
         }
     }
 
@@ -55,7 +57,7 @@ impl Scale {
         match self.spread {
             Spread::Linear => {
                 let step = round_step((self.high - self.low) / count.max(1) as f64);
-                let decimals = (-(step.log10() + 1e-9).floor()).max(0.0) as usize;
+                let decimals = (-(real::log10(step) + 1e-9).floor()).max(0.0) as usize;
                 let slack = 1e-9 * (self.high - self.low);
                 let (first, last) = (((self.low - slack) / step).ceil(), ((self.high + slack) / step).floor());
                 let steps = (0..).map(|k| first + f64::from(k)).take_while(|k| *k <= last);
@@ -63,15 +65,15 @@ impl Scale {
                 steps.map(|k| k * step + 0.0).map(|v| (v, format!("{v:.decimals$}"))).collect()
             }
             Spread::Logarithmic => {
-                let powers = |v: f64, round: fn(f64) -> f64| round(v.log10()) as i32;
+                let powers = |v: f64, round: fn(f64) -> f64| round(real::log10(v)) as i32;
                 let (first, last) =
                     (powers(self.low * (1.0 - 1e-9), f64::ceil), powers(self.high * (1.0 + 1e-9), f64::floor));
                 let text = |k: i32| match k {
-                    -3..0 => format!("{:.*}", k.unsigned_abs() as usize, 10f64.powi(k)),
-                    0..5 => format!("{:.0}", 10f64.powi(k)),
+                    -3..0 => format!("{:.*}", k.unsigned_abs() as usize, real::powi(10.0, k)),
+                    0..5 => format!("{:.0}", real::powi(10.0, k)),
                     _ => format!("10{}", raised(k)),
                 };
-                (first..=last).map(|k| (10f64.powi(k), text(k))).collect()
+                (first..=last).map(|k| (real::powi(10.0, k), text(k))).collect()
             }
         }
     }
@@ -86,7 +88,7 @@ fn raised(number: i32) -> String {
 
 /// The least of 1, 2, 5, 10, … that is not below `step`.
 fn round_step(step: f64) -> f64 {
-    let power = 10f64.powf(step.log10().floor());
+    let power = real::powf(10.0, real::log10(step).floor());
     [1.0, 2.0, 5.0].into_iter().map(|m| m * power).find(|s| *s >= step * (1.0 - 1e-9)).unwrap_or(10.0 * power)
 }
 

@@ -6,6 +6,7 @@ use super::scale::Scale;
 use super::svg::{Anchor, Area, COLOURS, GREY, INK, Lettering, Paint, Svg, text_width};
 use crate::geom::{Aabb, Pose2};
 use crate::map::VoxelMap;
+use crate::math::real;
 use crate::robot::RobotModel;
 
 /// What stands on the floor.
@@ -157,12 +158,15 @@ impl TopView {
     /// The robot's outline at an end of the way, drawn strongly, with an arrow ahead and a name.
     pub fn end(&mut self, robot: &RobotModel, pose: Pose2, q: &[f64], name: &str) {
         let parts = outline::of_robot(robot, pose, q);
-        let reach =
-            parts.iter().flat_map(|p| &p.outline).map(|p| (p[0] - pose.x).hypot(p[1] - pose.y)).fold(0.1, f64::max);
+        let reach = parts
+            .iter()
+            .flat_map(|p| &p.outline)
+            .map(|p| real::hypot(p[0] - pose.x, p[1] - pose.y))
+            .fold(0.1, f64::max);
         let paint = Paint::line(INK, 1.6);
         self.items.extend(parts.into_iter().map(|p| Item::Outlines(vec![p.outline], paint)));
         let ahead = |d: f64, side: f64| {
-            let (sin, cos) = pose.yaw.sin_cos();
+            let (sin, cos) = real::sin_cos(pose.yaw);
             [pose.x + d * cos - side * sin, pose.y + d * sin + side * cos]
         };
         let head = [ahead(0.45 * reach, 0.0), ahead(0.2 * reach, 0.14 * reach), ahead(0.2 * reach, -0.14 * reach)];

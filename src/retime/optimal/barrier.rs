@@ -8,6 +8,7 @@
 //! sum is kept positive. So the Hessian is positive definite, with two diagonals beside the main one: O(n) a step.
 
 use crate::math::pentadiagonal::Pentadiagonal;
+use crate::math::real;
 
 use super::grid::Grid;
 use super::guess::guess;
@@ -101,7 +102,7 @@ impl Barrier {
                 ];
                 let rates = &grid.rates[(POINTS.len() * cell + i) * rows..][..rows];
                 let speed = (0..rows).map(|row| rates[row][0].abs() / problem.limits[row][0]).fold(0.0, f64::max);
-                points.push(Point { basis, weight: weight * h, cap: speed.max(STILL).powi(-2) });
+                points.push(Point { basis, weight: weight * h, cap: real::powi(speed.max(STILL), -2) });
                 acceleration.extend(accelerated.iter().map(|row| {
                     let limit = problem.limits[*row][1];
                     [rates[*row][1] / limit, 0.5 * rates[*row][0] / limit]
@@ -162,7 +163,7 @@ impl Barrier {
                 // Each of the two parts within half the limit where a jump takes one.
                 let own = (root * (j0 * b + j1 * b1 + j2 * b2)).abs();
                 let half = if *k > 0.0 { 2.0 } else { 1.0 };
-                inverse = inverse.max((half * own).cbrt().powi(2)).max(half * k * b);
+                inverse = inverse.max(real::powi(real::cbrt(half * own), 2)).max(half * k * b);
             }
         }
         1.0 / inverse
@@ -236,7 +237,7 @@ impl Barrier {
             let inverse = 1.0 / x[i];
             self.hessian.rows[i][0] = keep(sign, inverse);
             gradient[i] = mu * inverse;
-            value.logs += x[i].ln();
+            value.logs += real::ln(x[i]);
         }
         for (i, point) in self.points.iter().enumerate() {
             let cell = Self::cell(i);
@@ -294,7 +295,7 @@ impl Barrier {
             if least <= 0.0 {
                 return None;
             }
-            value.logs += product.ln();
+            value.logs += real::ln(product);
             h[0] += curvature.max(LEAST_CURVATURE * point.weight * r2);
             let [e0, e1, e2] = &point.basis;
             let mut block = [0.0; 6];

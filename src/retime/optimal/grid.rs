@@ -1,6 +1,7 @@
 //! Where the unknown function has its knots, and what the rows do there.
 
 use super::Problem;
+use crate::math::real;
 
 /// Least and most cells, jumps apart.
 const CELLS: (f64, f64) = (80.0, 1000.0);
@@ -133,7 +134,7 @@ impl Grid {
                 let uneven = (0..rows).any(|row| {
                     (1..3).any(|k| {
                         let off = at(1, row)[k] - 0.5 * (at(0, row)[k] + at(2, row)[k]);
-                        off.abs() > most * problem.limits[row][k] * slowness.powi(k as i32 + 1)
+                        off.abs() > most * problem.limits[row][k] * real::powi(slowness, k as i32 + 1)
                     })
                 });
                 if uneven && end - start > least {
@@ -216,8 +217,9 @@ fn stretches(problem: &Problem<'_>, rates: &mut impl FnMut(f64, &mut Vec<[f64; 3
         let slowness = stretches[i - 1].slowness[SAMPLES - 1].max(stretches[i].slowness[0]);
         let (before, after) = &beside[i];
         let jump = |k: usize, row: usize| (after[row][k] - before[row][k]).abs();
-        let jumps =
-            |k: usize, row: usize| jump(k, row) > JUMP[k - 1] * problem.limits[row][k] * slowness.powi(k as i32 + 1);
+        let jumps = |k: usize, row: usize| {
+            jump(k, row) > JUMP[k - 1] * problem.limits[row][k] * real::powi(slowness, k as i32 + 1)
+        };
         let rows = problem.limits.len();
         if (0..rows).any(|row| jumps(1, row) || jumps(2, row)) {
             let second = (0..rows).map(|row| if jumps(1, row) { jump(1, row) } else { 0.0 });
@@ -231,7 +233,7 @@ fn stretches(problem: &Problem<'_>, rates: &mut impl FnMut(f64, &mut Vec<[f64; 3
 fn pointwise(rates: &[[f64; 3]], limits: &[[f64; 3]]) -> f64 {
     rates.iter().zip(limits).fold(0.0, |most: f64, (rates, limits)| {
         let [speed, acceleration, jerk] = [0, 1, 2].map(|k| rates[k].abs() / limits[k]);
-        most.max(speed).max(acceleration.sqrt()).max(jerk.cbrt())
+        most.max(speed).max(acceleration.sqrt()).max(real::cbrt(jerk))
     })
 }
 

@@ -1,6 +1,7 @@
 //! Where the interior-point method starts.
 
 use crate::math::pentadiagonal::Pentadiagonal;
+use crate::math::real;
 
 use super::grid::Grid;
 use super::{Problem, STILL};
@@ -16,7 +17,7 @@ pub(super) fn guess(problem: &Problem<'_>, grid: &Grid) -> Vec<f64> {
         let rates = &grid.rates[(3 * cell(i) + 1) * rows..][..rows];
         rates.iter().zip(problem.limits).map(|(rates, limits)| rates[0].abs() / limits[order]).fold(0.0, f64::max)
     };
-    let mut b: Vec<f64> = (0..count).map(|i| grid.slowness[cell(i)].powi(-2)).collect();
+    let mut b: Vec<f64> = (0..count).map(|i| real::powi(grid.slowness[cell(i)], -2)).collect();
     let slope: Vec<f64> = (0..count).map(|i| 1.0 / share(i, 1).max(STILL)).collect();
     let rise = |i: usize| 0.5 * (slope[i] + slope[i - 1]) * (place(i) - place(i - 1));
     for i in 1..count {

@@ -1,6 +1,7 @@
 //! The kernel on curves whose least time is known.
 
 use super::*;
+use crate::math::real;
 use crate::retime::convolution::Convolution;
 use proptest::prelude::*;
 
@@ -19,7 +20,7 @@ fn solve(breaks: &[f64], limits: &[[f64; 3]], rates: impl Fn(f64, &mut Rows)) ->
         for (q, limit) in rows.iter().zip(limits) {
             let moved = crate::retime::course::compose(*q, [r1, r2, r3]);
             let [v, a, j] = [0, 1, 2].map(|k| moved[k].abs() / limit[k]);
-            largest = largest.max(v).max(a.sqrt()).max(j.cbrt());
+            largest = largest.max(v).max(a.sqrt()).max(real::cbrt(j));
         }
     }
     (pace.duration(), largest)
@@ -48,7 +49,7 @@ fn bend(distance: f64, bend: f64, limits: [f64; 3], backwards: bool) -> (f64, f6
         let (a, s) = (if backwards { -a } else { a }, 7.0 * s / distance);
         let w = 7.0 / distance * if backwards { -1.0 } else { 1.0 };
         for side in [bend, -bend] {
-            let q = [1.0 + side * s.sin(), w * side * s.cos(), -w * w * side * s.sin()];
+            let q = [1.0 + side * real::sin(s), w * side * real::cos(s), -w * w * side * real::sin(s)];
             out.push(crate::retime::course::compose(q, [v, a, j]));
         }
     })
@@ -96,7 +97,7 @@ proptest! {
         let (time, _) = bend(distance, sway, limits, false);
         let (scaled, _) = bend(distance * size, sway, limits.map(|limit| limit * size), false);
         prop_assert!((scaled / time - 1.0).abs() < 1e-6, "{time} s, {scaled} s");
-        let slow = [limits[0] / slower, limits[1] / slower.powi(2), limits[2] / slower.powi(3)];
+        let slow = [limits[0] / slower, limits[1] / real::powi(slower, 2), limits[2] / real::powi(slower, 3)];
         let (slowed, _) = bend(distance, sway, slow, false);
         prop_assert!((slowed / (time * slower) - 1.0).abs() < 1e-6, "{time} s, {slowed} s");
     }
@@ -112,8 +113,8 @@ fn a_reference_that_starts_more_gently_than_any_least_time_costs_little() {
         let x = t / duration;
         let y = 1.0 - x;
         let third = 840.0 * x * y * (1.0 - 5.0 * x * y);
-        let q = [140.0 * (x * y).powi(3), 420.0 * (x * y).powi(2) * (y - x), third];
-        out.push([0, 1, 2].map(|k| distance * q[k] / duration.powi(k as i32 + 1)));
+        let q = [140.0 * real::powi(x * y, 3), 420.0 * real::powi(x * y, 2) * (y - x), third];
+        out.push([0, 1, 2].map(|k| distance * q[k] / real::powi(duration, k as i32 + 1)));
     });
     let least = Convolution::fastest(distance, limits[0]).duration();
     assert!((0.999..1.01).contains(&(time * largest / least)), "{time} s, {least} s, {largest}");

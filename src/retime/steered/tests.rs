@@ -1,6 +1,7 @@
 use super::*;
 use crate::geom::Pose2;
 use crate::math::poly::{Piece, PiecewisePoly};
+use crate::math::real;
 use crate::retime::{MotionProfile, RetimeOptions, retime};
 use crate::robot::MotionLimits;
 use crate::trajectory::{Leg, Trajectory, TrajectorySource, fixtures};
@@ -8,7 +9,7 @@ use crate::trajectory::{Leg, Trajectory, TrajectorySource, fixtures};
 /// The step from 0 to `size` in `t` seconds with three vanishing derivatives at both ends, from `start`.
 fn step(start: f64, size: f64, t: f64) -> Vec<f64> {
     let mut c = vec![start, 0.0, 0.0, 0.0];
-    c.extend([35.0, -84.0, 70.0, -20.0].iter().enumerate().map(|(k, a)| size * a / t.powi(4 + k as i32)));
+    c.extend([35.0, -84.0, 70.0, -20.0].iter().enumerate().map(|(k, a)| size * a / real::powi(t, 4 + k as i32)));
     c
 }
 
@@ -69,7 +70,7 @@ fn is_one_motion(profile: &MotionProfile, track: f64) {
                 assert!((slope - at[k + 1]).abs() < 2e-4, "order {k} at {t}: {slope} {at:?}");
             }
         }
-        let (sin, cos) = at.pose.yaw.sin_cos();
+        let (sin, cos) = real::sin_cos(at.pose.yaw);
         let v = 0.5 * (at.wheels[0][1] + at.wheels[1][1]);
         assert!(((high.pose.x - low.pose.x) / (2.0 * h) - v * cos).abs() < 1e-7);
         assert!(((high.pose.y - low.pose.y) / (2.0 * h) - v * sin).abs() < 1e-7);
@@ -110,9 +111,10 @@ fn a_leg_that_overdrives_is_slowed_down_uniformly_until_its_tightest_limit_just_
         let stretch = profile.time() / profile.unrounded_time();
         for jet in state.wheels {
             let limits = [0.5, 0.5, 2.0];
-            (0..3).for_each(|k| largest = largest.max(jet[k + 1].abs() * stretch.powi(k as i32 + 1) / limits[k]));
+            (0..3)
+                .for_each(|k| largest = largest.max(jet[k + 1].abs() * real::powi(stretch, k as i32 + 1) / limits[k]));
         }
-        let centre = |k: usize| 0.5 * (state.wheels[0][k] + state.wheels[1][k]).abs() * stretch.powi(k as i32);
+        let centre = |k: usize| 0.5 * (state.wheels[0][k] + state.wheels[1][k]).abs() * real::powi(stretch, k as i32);
         largest = largest.max(centre(1) / robot.base.speed).max(centre(2) / robot.base.acceleration);
     }
     assert!((0.9999..1.0 + 1e-7).contains(&largest), "{largest}");

@@ -4,6 +4,7 @@ use nalgebra::{Matrix4, Rotation3, Vector3, Vector4};
 use proptest::prelude::*;
 
 use super::*;
+use crate::math::real;
 use crate::robot::{Body, MotionLimits};
 
 /// Homogeneous matrix of an `<origin>`, from the definition: yaw, then pitch, then roll.
@@ -21,7 +22,7 @@ fn moved(axis: [f64; 3], prismatic: bool, value: f64) -> Matrix4<f64> {
         return Matrix4::new_translation(&(a * value));
     }
     let k = a.cross_matrix();
-    (nalgebra::Matrix3::identity() + k * value.sin() + k * k * (1.0 - value.cos())).to_homogeneous()
+    (nalgebra::Matrix3::identity() + k * real::sin(value) + k * k * (1.0 - real::cos(value))).to_homogeneous()
 }
 
 proptest! {

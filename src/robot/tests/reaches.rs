@@ -4,13 +4,14 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use proptest::prelude::*;
 
 use super::*;
+use crate::math::real;
 use crate::robot::{Convex, ShapeReach};
 
 /// Points of a shape, in its own frame, that its hull needs, or many of its surface.
 fn surface(convex: &Convex) -> Vec<Point3<f64>> {
     let directions = (0..60).map(|i| {
         let z = 1.0 - (2.0 * f64::from(i) + 1.0) / 60.0;
-        let (sin, cos) = (2.4 * f64::from(i)).sin_cos();
+        let (sin, cos) = real::sin_cos(2.4 * f64::from(i));
         Vector3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
     });
     directions.map(|d| Point3::from(convex.support(&d))).collect()
@@ -24,7 +25,7 @@ fn assert_bounds(robot: &RobotModel, reaches: &[ShapeReach], top: f64, q: &[f64]
         let points = surface(&shape.convex);
         for p in &points {
             let p = poses[index] * p;
-            assert!(p.x.hypot(p.y) <= reach.radius + 1e-12, "{} at {q:?}", shape.link);
+            assert!(real::hypot(p.x, p.y) <= reach.radius + 1e-12, "{} at {q:?}", shape.link);
         }
         for joint in 0..robot.joint_count() {
             let step = 1e-6;
@@ -58,7 +59,7 @@ fn the_blades_reach_is_their_own_and_tight() {
             assert_eq!(reach.joints, [0.0], "{}", shape.link);
         } else {
             // The far end of a blade: 0.36 m from the hinge along an axis at 45 degrees, 0.05 and 0.01 m aside.
-            let arm = ((0.36f64 + 0.01).powi(2) / 2.0 + 0.05f64.powi(2)).sqrt();
+            let arm = (real::powi(0.36 + 0.01, 2) / 2.0 + real::powi(0.05, 2)).sqrt();
             assert!((reach.joints[0] - arm).abs() < 1e-6, "{} is not {arm}", reach.joints[0]);
             assert!(reach.radius >= brute && reach.radius < brute + 1e-3, "{} for {brute}", reach.radius);
         }

@@ -5,6 +5,7 @@ mod table;
 
 use crate::geom::Pose2;
 use crate::math::poly::{Piece, PiecewisePoly};
+use crate::math::real;
 use crate::math::spline::{SplineEnd, cubic_spline};
 use crate::robot::RobotModel;
 
@@ -41,7 +42,7 @@ pub fn from_bezier(segments: &[[[f64; 2]; 4]], joints: &[f64]) -> Result<Traject
             return Err(GivenError::NotFinite { segment });
         }
         if let Some(end) = end {
-            let gap = (points[0][0] - end[0]).hypot(points[0][1] - end[1]);
+            let gap = real::hypot(points[0][0] - end[0], points[0][1] - end[1]);
             if gap > JOIN_TOLERANCE {
                 return Err(GivenError::Gap { segment, gap });
             }
@@ -119,7 +120,7 @@ fn directed(poly: PiecewisePoly) -> Result<PlaneCurve, f64> {
 }
 
 fn turn_between(from: [f64; 2], to: [f64; 2]) -> f64 {
-    (from[0] * to[1] - from[1] * to[0]).atan2(from[0] * to[0] + from[1] * to[1])
+    real::atan2(from[0] * to[1] - from[1] * to[0], from[0] * to[0] + from[1] * to[1])
 }
 
 /// A path from CSV text: `x_m, y_m` and, for joints that move, `joint.<name>.pos_rad` (`_m` where prismatic). Lines that start
@@ -141,7 +142,7 @@ pub fn from_csv(
     let table = Table::read(name, text, robot)?;
     let mut knots = vec![0.0];
     for (i, pair) in table.rows.windows(2).enumerate() {
-        knots.push(knots[i] + (pair[1].point[0] - pair[0].point[0]).hypot(pair[1].point[1] - pair[0].point[1]));
+        knots.push(knots[i] + real::hypot(pair[1].point[0] - pair[0].point[0], pair[1].point[1] - pair[0].point[1]));
     }
     let last = table.rows.len() - 1;
     let chord = |i: usize, d: usize| (table.rows[i + 1].point[d] - table.rows[i].point[d]) / (knots[i + 1] - knots[i]);

@@ -1,5 +1,6 @@
 use super::*;
 use crate::diag::{Describe, Diagnostics};
+use crate::math::real;
 use crate::trajectory::fixtures;
 
 const C_CURVE: [[f64; 2]; 4] = [[0.0, 0.0], [3.0, 0.0], [4.0, 1.0], [4.0, 4.0]];
@@ -50,7 +51,7 @@ fn a_jump_of_curvature_is_a_stop_and_a_jump_of_the_tangent_a_spin() {
         panic!("{:?}", trajectory.legs)
     };
     assert_eq!((first.yaw_start, second.yaw_start), (0.0, 0.0));
-    let arrived = 0.7f64.atan2(0.2);
+    let arrived = real::atan2(0.7, 0.2);
     assert!((spin.pose.yaw - arrived).abs() < 1e-12 && (spin.yaw_end - std::f64::consts::PI).abs() < 1e-12);
     assert_eq!(third.yaw_start, spin.yaw_end);
     assert_eq!((spin.joints_from.as_slice(), spin.joints_to.as_slice()), (&[0.1][..], &[0.1][..]));

@@ -1,4 +1,5 @@
 use super::*;
+use crate::math::real;
 
 fn leg(pose: Pose2, pieces: &[(f64, Vec<f64>, Vec<f64>)]) -> SteerLeg {
     let pieces = pieces.iter().map(|(t, phi, s)| Piece { duration: *t, coefficients: vec![phi.clone(), s.clone()] });
@@ -12,7 +13,7 @@ fn curve(pieces: &[(f64, Vec<f64>, Vec<f64>)]) -> SteeredCurve {
 /// The step from 0 to `size` in `t` seconds with three vanishing derivatives at both ends, from `start`.
 fn step(start: f64, size: f64, t: f64) -> Vec<f64> {
     let mut c = vec![start, 0.0, 0.0, 0.0];
-    c.extend([35.0, -84.0, 70.0, -20.0].iter().enumerate().map(|(k, a)| size * a / t.powi(4 + k as i32)));
+    c.extend([35.0, -84.0, 70.0, -20.0].iter().enumerate().map(|(k, a)| size * a / real::powi(t, 4 + k as i32)));
     c
 }
 
@@ -29,7 +30,7 @@ fn simpson(piece: &Piece, to: f64, panels: usize) -> [f64; 2] {
         } else {
             2.0
         };
-        let (sin, cos) = piece.derivative(0, 0, u).sin_cos();
+        let (sin, cos) = real::sin_cos(piece.derivative(0, 0, u));
         let speed = piece.derivative(1, 1, u);
         sum = [sum[0] + weight * speed * cos, sum[1] + weight * speed * sin];
     }
@@ -63,7 +64,7 @@ fn a_clothoid_ends_where_fresnels_series_says() {
         (0..24).fold((0.0, 1.0f64), |(sum, sign), k| {
             let n = 2 * k + odd;
             let factorial: f64 = (1..=n).map(f64::from).product();
-            (sum + sign * t.powi(2 * n + 1) / (2f64.powi(n) * factorial * f64::from(2 * n + 1)), -sign)
+            (sum + sign * real::powi(t, 2 * n + 1) / (real::powi(2.0, n) * factorial * f64::from(2 * n + 1)), -sign)
         })
     };
     for t in [0.1, 1.0, 1.77, 2.5] {
@@ -90,7 +91,7 @@ fn a_cusp_drives_forth_and_back() {
     let cusp = curve(&[(2.0, vec![0.5], vec![0.0, 1.0, -0.5])]);
     assert!((cusp.length() - 1.0).abs() < 1e-14 && cusp.end_pose().distance(Pose2::default()) < 1e-15);
     let tip = cusp.pose(cusp.place(1.0));
-    assert!(tip.distance(Pose2::new(0.5 * 0.5f64.cos(), 0.5 * 0.5f64.sin(), 0.0)) < 1e-15);
+    assert!(tip.distance(Pose2::new(0.5 * real::cos(0.5), 0.5 * real::sin(0.5), 0.0)) < 1e-15);
     assert!((cusp.first_stop_inside().unwrap() - 1.0).abs() < 1e-12);
     assert!((cusp.travelled(cusp.place(1.5)) - 0.625).abs() < 1e-14);
     assert!((cusp.parameter(cusp.place_at_travelled(0.625)) - 1.5).abs() < 1e-12);
@@ -107,7 +108,7 @@ fn positions_agree_with_a_fine_independent_quadrature() {
             let u = share * duration;
             let pose = wild.pose(Place { piece: index, u });
             let by_simpson = simpson(piece, u, 20_000);
-            let off = (pose.x - start[0] - by_simpson[0]).hypot(pose.y - start[1] - by_simpson[1]);
+            let off = real::hypot(pose.x - start[0] - by_simpson[0], pose.y - start[1] - by_simpson[1]);
             assert!(off < 1e-11, "piece {index} at {u}: off by {off}");
         }
         let end = wild.pose(Place { piece: index, u: *duration });

@@ -3,6 +3,8 @@
 //! It has its own replay, its own kinematics, its own distance and its own bookkeeping of limits, ends, stands and zones; of the
 //! stages it names only the types that hold the data. It is slow, and need not be anything else.
 
+#![allow(clippy::disallowed_methods, reason = "nothing shared with the proof, so not its sines either")]
+
 mod figures;
 mod hunt;
 mod motion;
