@@ -4,10 +4,12 @@
 //! first read with roxmltree: depth, entities, names, references and numbers are judged there, with spans. urdf-rs then sees only
 //! what this stage uses; visuals, inertias and foreign elements are blanked, since a fault in them does not matter here.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
+use nalgebra::{Quaternion, UnitQuaternion};
 use roxmltree::{Attribute, Document, Node};
 
 use crate::diag::{Diagnostic, Diagnostics, Source, Span, nearest, suggestion};
@@ -474,44 +476,60 @@ fn example(key: &str) -> String {
 }
 
 /// The text with all that this stage does not use blanked, and `velocity="0"` (none) where a `<limit>` leaves it out: URDF asks
-/// for it before version 1.2, but published files leave it out on joints that never move.
+/// for it before version 1.2, but published files leave it out on joints that never move. Quaternions (since 1.1) become angles here, since
+/// urdf-rs takes the system's arc sine, whose last digit is not the same everywhere.
 fn reduced(text: &str, root: Node) -> String {
-    let mut edits: Vec<(Range<usize>, &str)> = Vec::new();
+    let mut edits: Vec<(Range<usize>, Cow<str>)> = Vec::new();
     if text.starts_with('\u{feff}') {
-        edits.push((0..'\u{feff}'.len_utf8(), ""));
+        edits.push((0..'\u{feff}'.len_utf8(), "".into()));
     }
-    let old = !root.attribute("version").is_some_and(|v| {
-        let (major, minor) = v.trim().split_once('.').unwrap_or(("1", "0"));
-        matches!((major.parse::<u32>(), minor.parse::<u32>()), (Ok(major), Ok(minor)) if (major, minor) >= (1, 2))
+    let version = root.attribute("version").and_then(|v| {
+        let (major, minor) = v.trim().split_once('.')?;
+        Some((major.parse::<u32>().ok()?, minor.parse::<u32>().ok()?))
     });
+    let old = version < Some((1, 2));
     for part in root.children().filter(Node::is_element) {
         let keep: &[&str] = match part.tag_name().name() {
             "link" => &["collision"],
             "joint" => &["origin", "parent", "child", "axis", "limit", "mimic"],
             _ => {
-                edits.push((part.range(), ""));
+                edits.push((part.range(), "".into()));
                 continue;
             }
         };
         for child in part.children().filter(Node::is_element) {
             let name = child.tag_name().name();
             if !keep.contains(&name) {
-                edits.push((child.range(), ""));
+                edits.push((child.range(), "".into()));
             } else if name == "limit" {
                 let at = child.range().start + "<limit".len();
                 let plain = text[child.range()].starts_with("<limit");
                 if old && plain && child.attribute("velocity").is_none() {
-                    edits.push((at..at, " velocity=\"0\""));
+                    edits.push((at..at, " velocity=\"0\"".into()));
                 }
-                edits.extend(child.attribute_node("effort").map(|effort| (effort.range(), "")));
+                edits.extend(child.attribute_node("effort").map(|effort| (effort.range(), "".into())));
+            } else if version >= Some((1, 1)) {
+                let origins = child.descendants().filter(|n| n.has_tag_name("origin") && n.attribute("rpy").is_none());
+                edits.extend(origins.filter_map(|n| n.attribute_node("quat_xyzw")).filter_map(|quaternion| {
+                    let [roll, pitch, yaw] = angles(quaternion.value())?;
+                    Some((quaternion.range(), format!("rpy=\"{roll} {pitch} {yaw}\"").into()))
+                }));
             }
         }
     }
     let (mut out, mut from) = (String::with_capacity(text.len()), 0);
     for (range, replacement) in edits {
         out += &text[from..range.start];
-        out += replacement;
+        out += &replacement;
         from = range.end;
     }
     out + &text[from..]
+}
+
+/// Roll, pitch and yaw of a quaternion `x y z w` of any length; the identity's where it has none. `None`: not four numbers.
+fn angles(text: &str) -> Option<[f64; 3]> {
+    let numbers: Result<Vec<f64>, _> = text.split_whitespace().map(str::parse).collect();
+    let [x, y, z, w] = <[f64; 4]>::try_from(numbers.ok()?).ok()?;
+    let turn = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 0.0).unwrap_or_default();
+    Some(turn.euler_angles().into())
 }

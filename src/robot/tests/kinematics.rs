@@ -1,6 +1,6 @@
 //! Poses against a naive chain, mimics, limits.
 
-use nalgebra::{Matrix4, Rotation3, Vector3, Vector4};
+use nalgebra::{Matrix4, Rotation3, Translation3, UnitQuaternion, Vector3, Vector4};
 use proptest::prelude::*;
 
 use super::*;
@@ -59,6 +59,31 @@ proptest! {
         prop_assert!((found.translation.vector - expected.xyz()).norm() < 1e-9);
         let turn: nalgebra::Matrix3<f64> = chain.fixed_view::<3, 3>(0, 0).into();
         prop_assert!((found.rotation.to_rotation_matrix().matrix() - turn).norm() < 1e-9);
+    }
+}
+
+#[test]
+fn quaternions_of_urdf_1_1_turn_joints_and_shapes_and_are_nothing_before() {
+    let half = (0.5f64).sqrt();
+    // Any length; the last two look straight up and down, where roll and yaw are one.
+    for [x, y, z, w] in
+        [[0.1, -0.7, 0.3, 0.6], [2.0, 1.0, -3.0, -0.5], [0.0, half, 0.0, half], [0.0, -half, 1e-7, half]]
+    {
+        let quaternion = format!(r#"quat_xyzw="{x} {y} {z} {w}""#);
+        let arm = limb("arm", "fixed", "base", "l", &format!(r#"<origin xyz="1 0 0" {quaternion}/>"#));
+        let arm = arm.replace(r#"<origin xyz="0.1 0 0"/>"#, &format!(r#"<origin xyz="0.1 0 0" {quaternion}/>"#));
+        let pose = |version: &str| {
+            let urdf = with_wheels(&arm).replacen(r#"<robot name="r">"#, &format!(r#"<robot name="r"{version}>"#), 1);
+            let robot = read(&urdf, &RobotSpec::default()).unwrap();
+            robot.shape_poses(&[])[robot.shapes.iter().position(|s| s.link == "l").unwrap()]
+        };
+        let turn = UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z));
+        let expected = Translation3::new(1.0, 0.0, 0.0) * turn * Translation3::new(0.1, 0.0, 0.0) * turn;
+        let off = pose(r#" version="1.1""#).to_homogeneous() - expected.to_homogeneous();
+        assert!(off.norm() < 1e-7, "{x} {y} {z} {w}: {off}");
+        for version in ["", r#" version="1.0""#] {
+            assert_eq!(pose(version).rotation, UnitQuaternion::identity());
+        }
     }
 }
 
