@@ -360,11 +360,8 @@ fn over_three_legs_poses_postures_and_speeds_are_those_of_one_motion() {
         for (k, mean) in means.iter().enumerate() {
             let t = (k + 1) as f64 * hold;
             let now = profile.at(t);
-            for side in 0..2 {
-                assert!(
-                    (now.wheels[side][0] - before.wheels[side][0] - hold * mean[side]).abs() < 1e-10,
-                    "{law:?} at {t}"
-                );
+            for ((now, before), mean) in now.wheels.iter().zip(&before.wheels).zip(mean) {
+                assert!((now[0] - before[0] - hold * mean).abs() < 1e-10, "{law:?} at {t}");
             }
             assert!((now.joints[0][0] - before.joints[0][0] - hold * mean[2]).abs() < 1e-10, "{law:?} at {t}");
             let middle = before.pose.yaw + 0.25 * hold * (mean[1] - mean[0]) / track * 2.0;
