@@ -189,6 +189,7 @@ fn legs_join_in_pose_and_travel() {
     assert_eq!(trajectory.legs.len(), 3);
     let profile = retime(&trajectory, &robot, &options(TimeLaw::Auto)).unwrap();
     limits_hold(&profile, &robot);
+    assert_eq!((profile.joint_count(), profile.speeds(0.0)), (0, vec![0.0; 2]));
     let steps = 20000;
     let mut before = profile.at(0.0);
     for i in 1..=steps {
@@ -207,7 +208,8 @@ fn a_curve_tighter_than_half_the_track_is_refused_by_eq5_and_driven_by_auto() {
     let hairpin = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.05], [0.0, 0.05]];
     let trajectory = given::from_bezier(&[hairpin], &[]).unwrap();
     let refused = retime(&trajectory, &robot, &options(TimeLaw::Eq5)).unwrap_err();
-    assert!(matches!(refused, RetimeError::CompensationLeavesNoSpeed { radius, .. } if radius < 0.2), "{refused:?}");
+    let RetimeError::CompensationLeavesNoSpeed { radius, left, .. } = refused else { panic!("{refused:?}") };
+    assert!(radius < 0.2 && left <= 5e-4, "{refused:?}");
     assert!(refused.diagnostic().hint.is_some());
     let profile = retime(&trajectory, &robot, &options(TimeLaw::Auto)).unwrap();
     assert_eq!(profile.law_name(), "auto (optimal)");

@@ -39,7 +39,7 @@ fn first_look<T>(x: f64, forward: bool, map: &VoxelMap, see: impl Fn(&Search<'_>
 
 #[test]
 fn the_first_look_at_a_row_finds_the_distance_at_its_end_or_where_it_comes_from() {
-    let edge = VoxelMap::new(0.1, [-1.0, -2.0, 0.0], [20, 40, 5], Unknown::Occupied); // beyond x = 1
+    let edge = VoxelMap::new(0.1, [-9.0, -9.0, 0.0], [100, 180, 5], Unknown::Occupied); // beyond x = 1
     for map in [&wall(), &edge] {
         // The row leads 0.2 m forward, to a distance of 0.1 m, or comes from there.
         for (x, forward, time) in [(0.5, true, 0.5), (0.7, false, 0.0)] {

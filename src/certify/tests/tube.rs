@@ -438,6 +438,25 @@ fn a_corner_that_starts_at_another_angle_is_in_the_tube_inwards_too() {
     }
 }
 
+/// After a small spin of a robot whose wheels are larger and nearer to each other, what two deviations make together is most of what the
+/// first order leaves out.
+#[test]
+fn a_point_before_a_base_that_spins_is_in_the_tube_with_two_deviations_together() {
+    let shape = Convex::Hull { vertices: vec![[0.0; 3]] };
+    let robot = with_shape(bare_robot(), 0, Isometry3::translation(1.0, 0.0, 0.0), shape);
+    let (turned, step) = (0.05, 0.1);
+    let (table, task) = commands(&robot, Pose2::default(), &[], step, &[(0.0, turned / step, vec![])]);
+    let rollout = Rollout::new(&table, task.start, &[]);
+    let tolerance = Tolerance { wheel_radius: 0.1, track: 0.4, ..Tolerance::default() };
+    let tube = Tube::new(&rollout, &robot, tolerance);
+    let [loose, _] = in_tube(&robot, (&rollout, &tube), (step, 0.0));
+    let aside = Vector3::new(-turned.sin(), turned.cos(), 0.0);
+    // Such a robot turns (1 + 0.1) / (1 - 0.4) times as far.
+    let more = turned * (1.1 / 0.6 - 1.0);
+    let bound = loose.posed.reach(&aside);
+    assert!(bound >= more.sin() && bound < more + more * more, "{bound} {more}");
+}
+
 #[test]
 fn the_shares_of_a_near_miss_are_those_of_the_point_that_is_nearest() {
     // The box's corner is at (0.7, 0.1), the cell's at (0.8, 0.2): on the diagonal.
