@@ -127,6 +127,8 @@ struct Search<'a> {
     /// Least bound of the intervals that were given up, m.
     unproven: f64,
     work: u64,
+    /// Work after which it gives up.
+    patience: u64,
     /// The plane that last served each shape.
     hints: Vec<Option<Vector3<f64>>>,
     boxes: Vec<(f64, Aabb)>,
@@ -165,6 +167,7 @@ impl<'a> Search<'a> {
             witness: None,
             unproven: f64::INFINITY,
             work: 0,
+            patience: WORK,
             hints,
             boxes: Vec::new(),
             found: Vec::new(),
@@ -221,7 +224,7 @@ impl<'a> Search<'a> {
         if interval.lower >= self.target() || self.least <= 0.0 {
             return true; // the target has come down since
         }
-        let gave_up = self.work > WORK;
+        let gave_up = self.work > self.patience;
         if gave_up {
             self.unproven = self.unproven.min(interval.lower);
         }
@@ -523,3 +526,6 @@ pub(super) fn beyond(edge: &Edge, bounds: &Aabb) -> f64 {
 pub(super) fn gap(a: &Aabb, b: &Aabb) -> f64 {
     (0..3).map(|i| real::powi((a.min[i] - b.max[i]).max(b.min[i] - a.max[i]).max(0.0), 2)).sum::<f64>().sqrt()
 }
+
+#[cfg(test)]
+mod tests;

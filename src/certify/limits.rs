@@ -56,7 +56,7 @@ fn peaks(speeds: &[f64], step: f64) -> [Peak; 3] {
     let at = |k: usize, back: usize| if k >= back { speeds.get(k - back).copied().unwrap_or(0.0) } else { 0.0 };
     let largest = |value: &dyn Fn(usize) -> f64| {
         let mut peak = Peak { magnitude: 0.0, row: 0 };
-        for k in 0..speeds.len() + 2 {
+        for k in 0..=speeds.len() + 1 {
             let magnitude = value(k).abs();
             if magnitude > peak.magnitude {
                 peak = Peak { magnitude, row: k.min(speeds.len().saturating_sub(1)) };
@@ -96,4 +96,43 @@ pub(super) fn positions(rollout: &Rollout<'_>, robot: &RobotModel) -> Vec<Refusa
         refusals.push(Refusal { kind: RefusalKind::Position, message, time: Some(time) });
     }
     refusals
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn peaks_are_those_of_the_differences_with_rest_before_and_after(
+            speeds in prop::collection::vec(-1.0..1.0f64, 1..9), step in 0.05..0.5f64,
+        ) {
+            let padded = [vec![0.0; 3], speeds.clone(), vec![0.0; 3]].concat();
+            let difference = |values: &[f64]| values.windows(2).map(|w| (w[1] - w[0]) / step).collect::<Vec<f64>>();
+            let (first, second) = (difference(&padded), difference(&difference(&padded)));
+            for (peak, values) in peaks(&speeds, step).iter().zip([&padded, &first, &second]) {
+                let expected = values.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+                prop_assert!((peak.magnitude - expected).abs() < 1e-9 * (1.0 + expected), "{} {expected}", peak.magnitude);
+                prop_assert!(peak.row < speeds.len());
+            }
+        }
+    }
+
+    #[test]
+    fn a_ramp_that_ends_at_rest_jerks_after_its_last_row() {
+        // Slower by less and less more, up to a slope of 1 that the stop cuts off two rows after the last.
+        let speeds = [
+            0.1, 0.3, 0.6, 1.0, 1.5, 2.1, 2.8, 3.4, 3.9, 4.3, 4.6, 4.8, 4.9, 4.9, 4.8, 4.6, 4.3, 3.9, 3.4, 2.8, 2.0,
+            1.0,
+        ];
+        let [_, _, jerk] = peaks(&speeds, 1.0);
+        assert!(
+            (jerk.magnitude - 1.0).abs() < 1e-12 && jerk.row == speeds.len() - 1,
+            "{} {}",
+            jerk.magnitude,
+            jerk.row
+        );
+    }
 }

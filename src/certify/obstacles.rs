@@ -169,7 +169,7 @@ impl<'a> Obstacles<'a> {
                 let before = scratch.open.get(next_open).copied();
                 let before = before.filter(|&at| scratch.slice[at].low[2] == begin && scratch.slice[at].high[2] == end);
                 let at = before.unwrap_or_else(|| {
-                    scratch.slice.push(Cells { low: [i, j, begin], high: [i + 1, j + 1, end] });
+                    scratch.slice.push(Cells { low: [i, j, begin], high: [i, j, end] }); // grows below and in `merge_slice`
                     scratch.slice.len() - 1
                 });
                 scratch.slice[at].high[1] = j + 1;
@@ -287,6 +287,59 @@ mod tests {
                 Obstacles::new(&map).near(&window, &mut boxes);
                 assert_eq!(boxes, [map.cube([5, 5, 5])], "{window:?}");
             }
+        }
+    }
+
+    #[test]
+    fn a_mask_has_the_bits_of_its_cells_and_no_others() {
+        for (low, high) in [(0, 1), (0, 64), (3, 70), (63, 65), (64, 128), (70, 71), (5, 200), (130, 190)] {
+            for word in low / 64..=(high - 1) / 64 {
+                let expected = (0..64).filter(|bit| (low..high).contains(&(64 * word + bit)));
+                assert_eq!(
+                    mask(word, low, high),
+                    expected.fold(0, |bits, bit| bits | 1 << bit),
+                    "{low}..{high}, {word}"
+                );
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_block_has_something_where_one_of_its_cells_is_occupied(
+            cells in prop::collection::vec([0..20usize, 0..20usize, 0..150usize], 1..6), low in 0..150usize, size in 1..150usize,
+        ) {
+            let mut map = VoxelMap::new(0.05, [0.0; 3], [20, 20, 150], Unknown::Free);
+            cells.iter().for_each(|cell| map.occupy(*cell));
+            let high = (low + size).min(150);
+            let mut obstacles = Obstacles::new(&map);
+            obstacles.summarise([0; 3], [20, 20, 150]);
+            for i in 0..3 {
+                for j in 0..3 {
+                    let own = |c: &[usize; 3]| c[0] / BLOCK == i && c[1] / BLOCK == j && (low..high).contains(&c[2]);
+                    prop_assert_eq!(obstacles.block_has(i, j, low, high), cells.iter().any(own));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_shelf_over_a_wall_that_ends_before_it_becomes_two_boxes() {
+        // Along x and along y: cells 1 and 2 of the height up to the middle, cells 5 and 6 all the way.
+        for axis in 0..2 {
+            let mut map = VoxelMap::new(0.1, [0.0; 3], [16, 16, 10], Unknown::Free);
+            for along in 0..16 {
+                for k in [1, 2, 5, 6] {
+                    let mut cell = [3, 3, k];
+                    cell[axis] = along;
+                    if along < 8 || k > 4 {
+                        map.occupy(cell);
+                    }
+                }
+            }
+            let mut boxes = Vec::new();
+            Obstacles::new(&map).near(&Aabb { min: [0.0; 3], max: [1.6, 1.6, 1.0] }, &mut boxes);
+            assert_eq!(boxes.len(), 2, "{boxes:?}");
         }
     }
 

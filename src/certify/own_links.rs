@@ -59,6 +59,8 @@ struct Check<'a> {
     /// What must be between two shapes, m.
     margin: f64,
     work: u64,
+    /// Work after which it gives up.
+    patience: u64,
     // Scratch.
     joints: Vec<f64>,
     bodies: Vec<Moving>,
@@ -76,7 +78,7 @@ impl<'a> Check<'a> {
         let margin = TOUCHING + 2.0 * rollout.rounding(kinematics.size(&extreme), 0.0);
         let hints = vec![Vector3::z(); pairs.len()];
         let (joints, bodies) = (Vec::new(), Vec::new());
-        Self { rollout, robot, kinematics, pairs, hints, margin, work: 0, joints, bodies }
+        Self { rollout, robot, kinematics, pairs, hints, margin, work: 0, patience: WORK, joints, bodies }
     }
 
     /// Row after row; the first that is not proven ends it.
@@ -122,7 +124,7 @@ impl<'a> Check<'a> {
                     Found::Touch => return Some(self.touch(pair, row, part.tau)),
                     Found::Open(distance) => {
                         let still = self.pairs[pair].iter().all(|shape| shapes[*shape].motion(part.half) < RESOLUTION);
-                        if still || self.work > WORK {
+                        if still || self.work > self.patience {
                             return Some(self.unproven(pair, row, part.tau, distance));
                         }
                         open.push(pair);
@@ -204,3 +206,6 @@ impl<'a> Check<'a> {
 fn within_the_base(held: Held<'_>) -> Held<'_> {
     Held { speed: 0.0, turn_rate: 0.0, ..held }
 }
+
+#[cfg(test)]
+mod tests;

@@ -134,6 +134,29 @@ mod tests {
         assert!((extreme[0] - 0.2).abs() < 1e-15);
     }
 
+    /// A bound for a robot of a size that drives at a speed, turned by `yaw` and with a slide out by `joint`, `far` from the origin.
+    fn bound(size: f64, speed: f64, yaw: f64, joint: f64, far: f64) -> f64 {
+        let robot = crate::certify::tests::robots::with_joint(bare_robot(), true);
+        let held = vec![(speed, 0.0, vec![0.0]); 5];
+        let table = commands(&robot, Pose2::new(0.0, 0.0, yaw), &[joint], 0.1, &held).0;
+        Rollout::new(&table, Pose2::new(0.0, 0.0, yaw), &[joint]).rounding(size, far)
+    }
+
+    #[test]
+    fn the_bound_on_rounding_grows_with_all_that_is_added_up_and_in_proportion_to_lengths() {
+        let usual = [0.3, 0.7, 2.0, 3.0, 0.9];
+        let of = |[size, speed, yaw, joint, far]: [f64; 5]| bound(size, speed, yaw, joint, far);
+        for which in 0..5 {
+            let mut more = usual;
+            more[which] *= 2.0;
+            assert!(of(more) > of(usual) * 1.01, "{which}");
+        }
+        // A robot, a way and a map that are a thousand times as large; a joint's value may be an angle, so it stays.
+        let mut large = usual;
+        [0, 1, 4].into_iter().for_each(|which| large[which] *= 1e3);
+        assert!((of(large) / of(usual) - 1e3).abs() < 1e-6);
+    }
+
     #[test]
     fn rounding_far_away_is_no_more_than_its_bound_and_the_bound_is_small() {
         let robot = bare_robot();

@@ -45,6 +45,7 @@ pub fn distances(
         let shapes = near.shapes(&rollout, row);
         let (distance, nearest) = near.distance(&shapes, reach, hint);
         hint = nearest;
+        let distance = if distance > reach { f64::INFINITY } else { distance };
         Instant { time: rollout.time(row, 0.0), distance }
     })
     .collect()
@@ -65,7 +66,7 @@ impl<'a> Near<'a> {
         (0..self.kinematics.shape_count()).map(|s| self.kinematics.shape(s, &bodies, pose, 0.0).posed).collect()
     }
 
-    /// The least distance, and the box that it is from. `hint`: the box that was nearest an instant before, whose distance now says how
+    /// The least distance that is not beyond `reach` (or any that is), and the box that it is from. `hint`: the box that was nearest an instant before, whose distance now says how
     /// far one must look.
     fn distance(&mut self, shapes: &[Posed<'_>], reach: f64, hint: Option<Aabb>) -> (f64, Option<Aabb>) {
         let bounds: Vec<Aabb> = shapes.iter().map(Posed::bounds).collect();
@@ -88,7 +89,7 @@ impl<'a> Near<'a> {
                 improve(&mut least, shape, obstacle);
             }
         }
-        if least.0 > reach { (f64::INFINITY, least.1) } else { least }
+        least
     }
 }
 
@@ -102,4 +103,46 @@ fn improve(least: &mut (f64, Option<Aabb>), shape: &Posed<'_>, obstacle: &Aabb) 
 
 fn union(a: Aabb, b: Aabb) -> Aabb {
     Aabb { min: std::array::from_fn(|i| a.min[i].min(b.min[i])), max: std::array::from_fn(|i| a.max[i].max(b.max[i])) }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Isometry3;
+
+    use super::*;
+    use crate::certify::tests::robots::{bare_robot, commands, with_joint, with_shape};
+    use crate::mission::Unknown;
+    use crate::robot::Convex;
+
+    #[test]
+    fn distances_in_an_obstacle_are_how_deep_it_is() {
+        let robot =
+            with_shape(bare_robot(), 0, Isometry3::translation(0.0, 0.0, 0.2), Convex::Box { half: [0.2, 0.2, 0.1] });
+        let mut map = VoxelMap::new(0.1, [-1.0, -1.0, 0.0], [20, 20, 5], Unknown::Free);
+        (0..20).for_each(|j| (15..20).for_each(|i| (0..5).for_each(|k| map.occupy([i, j, k])))); // from x = 0.5
+        let start = Pose2::new(0.25, 0.0, 0.0);
+        let (table, _) = commands(&robot, start, &[], 0.1, &vec![(0.5, 0.0, vec![]); 3]);
+        let found = distances(&table, &robot, &map, (start, &[]), 1, 1.0);
+        // The front begins 5 cm before the wall and drives 5 cm a row.
+        for (instant, expected) in found.iter().zip([0.05, 0.0, -0.05, -0.1]) {
+            assert!((instant.distance - expected).abs() < 1e-7, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_table_without_rows_or_with_other_joints_has_no_distances() {
+        let robot = with_joint(bare_robot(), false);
+        let map = VoxelMap::new(0.1, [0.0; 3], [4, 4, 4], Unknown::Free);
+        let (table, _) = commands(&robot, Pose2::default(), &[0.3], 0.1, &[]);
+        let count = |table: &CommandTable, joints: &[f64]| {
+            distances(table, &robot, &map, (Pose2::default(), joints), 1, 1.0).len()
+        };
+        assert_eq!(count(&table, &[0.3]), 1);
+        assert_eq!(count(&table, &[]), 0);
+        let mut other = table.clone();
+        other.rows[0].joint_velocities.push(0.0);
+        assert_eq!(count(&other, &[0.3]), 0);
+        other.rows.clear();
+        assert_eq!(count(&other, &[0.3]), 0);
+    }
 }

@@ -128,7 +128,59 @@ mod tests {
         [-1.0..1.0, -1.0..1.0, -1.0..1.0f64].prop_map(Vector3::from)
     }
 
+    /// A tetrahedron around the origin.
+    const AROUND: [[f64; 3]; 4] = [[1.0, 1.0, 1.0], [-1.0, -1.2, 1.0], [-1.0, 1.0, -0.8], [1.0, -1.0, -1.0]];
+
+    #[test]
+    fn the_origin_inside_is_found_however_small_or_large_the_simplex() {
+        for scale in [1e-9, 1e-3, 1.0, 1e3, 1e6] {
+            let mut simplex = Simplex::new(Vector3::from(AROUND[0]) * scale);
+            AROUND[1..].iter().for_each(|c| simplex.push(Vector3::from(*c) * scale));
+            assert_eq!(simplex.reduce(), None, "{scale}");
+        }
+    }
+
+    #[test]
+    fn a_simplex_has_the_corners_it_was_made_of_and_no_others() {
+        let [a, b] = [AROUND[0], AROUND[1]].map(Vector3::from);
+        let mut simplex = Simplex::new(a);
+        assert!(simplex.has(&a) && !simplex.has(&b));
+        simplex.push(b);
+        assert!(simplex.has(&a) && simplex.has(&b) && !simplex.has(&(0.5 * (a + b))));
+    }
+
     proptest! {
+        #[test]
+        fn a_corner_that_was_dropped_counts_no_more(corners in prop::collection::vec(point(), 5), count in 2..5usize) {
+            // Beside the origin, so that something is dropped.
+            let beside = |c: &Vector3<f64>| c + Vector3::new(1.1, 0.0, 0.0);
+            let mut simplex = Simplex::new(beside(&corners[0]));
+            corners[1..count].iter().for_each(|c| simplex.push(beside(c)));
+            let _ = simplex.reduce();
+            let kept = simplex.corners[..simplex.count].to_vec();
+            prop_assume!(kept.len() < 4);
+            let mut anew = Simplex::new(kept[0]);
+            kept[1..].iter().for_each(|c| anew.push(*c));
+            let next = corners[4] - Vector3::new(0.5, 0.0, 0.0);
+            simplex.push(next);
+            anew.push(next);
+            prop_assert_eq!(simplex.reduce(), anew.reduce());
+        }
+
+        #[test]
+        fn the_origin_beside_a_flat_tetrahedron_is_outside(
+            axes in [point(), point()], places in prop::collection::vec([1.0..2.0, -1.0..1.0f64], 4), off in prop_oneof![Just(0.0), 0.0..1.0f64],
+        ) {
+            let (Some(x), Some(z)) = (axes[0].try_normalize(0.1), axes[0].cross(&axes[1]).try_normalize(0.05)) else { return Ok(()) };
+            let y = z.cross(&x);
+            // Four points of a plane, but for rounding, at least a metre off along x.
+            let corners: Vec<_> = places.iter().map(|[along, across]| x * *along + y * *across + z * off).collect();
+            let mut simplex = Simplex::new(corners[0]);
+            corners[1..].iter().for_each(|c| simplex.push(*c));
+            let nearest = simplex.reduce();
+            prop_assert!(nearest.is_some_and(|p| p.norm() > 1.0 - 1e-9), "{nearest:?}");
+        }
+
         #[test]
         fn the_nearest_point_separates_the_simplex_from_the_origin(corners in prop::collection::vec(point(), 1..5)) {
             let mut simplex = Simplex::new(corners[0]);

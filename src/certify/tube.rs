@@ -325,6 +325,25 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_farthest_sum_is_that_of_the_best_of_all_signs() {
+        let drifts = [[3.0, 1.0], [-2.0, 0.5], [0.1, 0.7], [-0.3, 1.9]].map(Vector2::from);
+        for turn in 0..24 {
+            let mut along = drifts;
+            // Each vector turned by another angle, so that every choice of signs is the best one somewhere.
+            along
+                .iter_mut()
+                .enumerate()
+                .for_each(|(i, v)| *v = nalgebra::Rotation2::new(f64::from(turn) * (i as f64 + 0.3)) * *v);
+            let choices = (0..16).map(|bits| {
+                let signed = along.iter().enumerate().map(|(i, v)| if bits & (1 << i) == 0 { *v } else { -v });
+                signed.sum::<Vector2<f64>>().norm()
+            });
+            let best = choices.fold(0.0, f64::max);
+            assert!((farthest(&along) - best).abs() < 1e-12, "{turn}");
+        }
+    }
+
+    #[test]
     fn the_lag_of_an_arc_is_its_integral_near_zero_too() {
         for x in [1e-4, 3e-3, 0.009, 0.0099, 0.0101, 0.3, 1.0, 3.0, 7.5] {
             // (cos x - sin(x)/x) / x = -integral of s sin(s x) over s from 0 to 1, here by Simpson's rule.

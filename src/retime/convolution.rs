@@ -282,4 +282,27 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn the_greatest_speed_is_that_in_the_middle() {
+        for (distance, limits) in
+            [(0.0, [1.0; 3]), (1e-3, [0.5, 0.2, 0.2]), (0.5, [0.5, 0.2, 0.2]), (9.0, [0.5, 0.2, 0.2])]
+        {
+            let profile = Convolution::fastest(distance, limits);
+            assert!((profile.peak_speed() - profile.at(0.5 * profile.duration())[1]).abs() < 1e-15, "{distance}");
+        }
+    }
+
+    #[test]
+    fn in_the_midst_of_one_stretch_of_jerk_the_jerk_is_what_it_is_before() {
+        // Without a cruise: short of the acceleration limit, and at it.
+        for distance in [1e-3, 0.05, 0.3, 1.0] {
+            let profile = Convolution::fastest(distance, [5.0, 0.2, 0.2]);
+            let (middle, [_, v, a, jerk]) = (0.5 * profile.duration(), profile.at(0.5 * profile.duration()));
+            let before = profile.at(middle * (1.0 - 1e-6));
+            assert!((jerk + 0.2).abs() < 1e-9 && (before[3] - jerk).abs() < 1e-9, "{distance}: {jerk} {before:?}");
+            assert!(a.abs() < 1e-9 && (v - before[1]).abs() < 1e-9);
+        }
+        assert_eq!(Convolution::fastest(9.0, [0.5, 0.2, 0.2]).at(11.0)[3], 0.0);
+    }
 }

@@ -83,4 +83,18 @@ mod tests {
         assert_eq!(omega <= 2.0 * 0.4 * (0.5 - v) / 0.4, rates[4][0] <= 0.5);
         assert!((rates[4][0] - (0.35 + 0.4 / 0.8 * 0.25)).abs() < 1e-15);
     }
+
+    #[test]
+    fn what_the_wheels_do_not_imply_of_the_bases_limits_is_planned_with() {
+        let mut robot = fixtures::conv();
+        // Wheels of 0.2 m/s^2, 0.4 m apart, turn the base at up to 1 rad/s^2.
+        for (angular, planned) in [(0.99, 0.99), (0.5, 0.5), (1.01, f64::INFINITY)] {
+            robot.base.angular_acceleration = angular;
+            assert_eq!(planning(&robot)[3][1], planned);
+        }
+        for (along, planned) in [(0.19, 0.19), (0.21, f64::INFINITY)] {
+            robot.base.acceleration = along;
+            assert_eq!(planning(&robot)[2][1], planned);
+        }
+    }
 }

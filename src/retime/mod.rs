@@ -223,7 +223,6 @@ pub fn retime_in(
 fn course(what: &Leg, leg: usize, robot: &RobotModel) -> Result<Course, RetimeError> {
     let joints = match what {
         Leg::Drive(d) => d.curve.pieces.first().map_or(2, |p| p.coefficients.len()).saturating_sub(2),
-        Leg::Still(s) if s.joints_from.len() == s.joints_to.len() => s.joints_from.len(),
         Leg::Still(s) => s.joints_from.len().max(s.joints_to.len()),
         Leg::Steer(s) => s.curve.pieces.first().map_or(2, |p| p.coefficients.len()).saturating_sub(2),
     };

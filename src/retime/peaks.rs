@@ -66,18 +66,32 @@ pub fn peaks(breaks: &[f64], refine: bool, mut rates: impl FnMut(f64, &mut Vec<[
                 let worth = WORTH_REFINING * found.rates[actuator][order];
                 let at = |sample: usize| values[sample * actuators + actuator][order].abs();
                 for stretch in 0..stretches {
-                    for i in 1..=SAMPLES {
-                        let here = stretch * per_stretch + i;
+                    let (first, last) = (stretch * per_stretch, stretch * per_stretch + SAMPLES + 1);
+                    let mut refine = |bracket: [f64; 3], middle: Option<f64>| {
+                        let mut value = |t: f64| {
+                            scratch.clear();
+                            rates(t, &mut scratch);
+                            scratch[actuator][order].abs()
+                        };
+                        let middle = middle.unwrap_or_else(|| value(bracket[1]));
+                        let better = maximum(bracket, middle, value);
+                        found.rates[actuator][order] = found.rates[actuator][order].max(better);
+                    };
+                    // Beside a break the sample there may be the largest and the maximum still be within: where the values rise from the
+                    // break, by the parabola through the first three samples.
+                    for [end, next, third] in [[first, first + 1, first + 2], [last, last - 1, last - 2]] {
+                        let [v0, v1, v2] = [end, next, third].map(at);
+                        if v0 >= worth && v0 >= v1 && 4.0 * v1 > 3.0 * v0 + v2 {
+                            let (low, high) = (times[end.min(next)], times[end.max(next)]);
+                            refine([low, 0.5 * (low + high), high], None);
+                        }
+                    }
+                    for here in first + 1..last {
                         let value = at(here);
                         if value < worth || value <= 0.0 || value < at(here - 1) || value < at(here + 1) {
                             continue;
                         }
-                        let better = maximum([times[here - 1], times[here], times[here + 1]], value, |t| {
-                            scratch.clear();
-                            rates(t, &mut scratch);
-                            scratch[actuator][order].abs()
-                        });
-                        found.rates[actuator][order] = found.rates[actuator][order].max(better);
+                        refine([times[here - 1], times[here], times[here + 1]], Some(value));
                     }
                 }
             }
@@ -154,6 +168,19 @@ fn jump_slow_down(factor: f64, impulse: f64, jerk: f64, limit: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_peak_beside_a_break_is_found_though_the_sample_at_the_break_is_the_largest() {
+        // One stretch of a second: samples 1/8 s apart, the peak less than half of that from a break.
+        for offset in [0.01, 0.03, 0.05, 0.06] {
+            for top in [offset, 1.0 - offset] {
+                let found =
+                    peaks(&[0.0, 1.0], true, |t, out| out.push([real::cos(t - top), 0.0, -3.0 * real::cos(t - top)]));
+                assert!((found.rates[0][0] - 1.0).abs() < 1e-12, "{top}: {}", found.rates[0][0]);
+                assert!((found.rates[0][2] - 3.0).abs() < 1e-11, "{top}: {}", found.rates[0][2]);
+            }
+        }
+    }
 
     #[test]
     fn peaks_between_samples_are_found_to_rounding() {

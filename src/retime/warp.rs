@@ -103,4 +103,17 @@ mod tests {
             assert!((warp.time_at(at[0]) - t).abs() < 1e-9);
         }
     }
+
+    #[test]
+    fn between_the_ramps_the_curves_own_seconds_pass_and_the_corners_are_where_ramps_end() {
+        let warp = Warp::new(5.0, [0.8, 1.4]);
+        for (found, expected) in warp.corners().iter().zip([0.0, 0.8, 4.7, 6.1]) {
+            assert!((found - expected).abs() < 1e-14, "{found}");
+        }
+        for i in 0..=61 {
+            let t = 0.1 * f64::from(i);
+            assert!((warp.time_at(warp.at(t)[0]) - t).abs() < 1e-6, "{t}");
+        }
+        assert!((warp.time_at(2.6) - 3.0).abs() < 1e-14);
+    }
 }

@@ -97,4 +97,17 @@ mod tests {
         }
         assert_eq!(Zones::new(&[], &robot, 0.1).speed_at([0.0; 2]), f64::INFINITY);
     }
+
+    #[test]
+    fn outside_a_zone_as_much_is_allowed_as_can_be_braked_from() {
+        let robot = fixtures::conv();
+        let (all, hold) = ([zone(1.0, 2.0, 0.2)], 0.1);
+        let zones = Zones::new(&all, &robot, hold);
+        for before in [0.05, 0.3, 1.5] {
+            // Braking at 0.2 m/s^2 from there: as slow as the zone asks for a command's way and 5 mm before it.
+            let (allowed, own) = (zones.speed_at([1.0 - before, 0.0]), 0.995 * 0.2);
+            let way = (allowed * allowed - own * own) / (2.0 * 0.2);
+            assert!((way + hold * own + 5e-3 - before).abs() < 1e-9, "{before}: {way}");
+        }
+    }
 }

@@ -2,7 +2,7 @@ use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
 
 use super::robots::*;
-use crate::certify::motion::Kinematics;
+use crate::certify::motion::{Kinematics, MovingShape};
 use crate::certify::rollout::Rollout;
 use crate::certify::tube::Tube;
 use crate::certify::{RefusalKind, Task, certify, trust, tube_along};
@@ -272,6 +272,219 @@ fn joints_are_late_where_they_move_within_the_latency() {
         tube.shares((row, 0.05), 0, nalgebra::Vector2::new(0.5, 0.0), nalgebra::Vector2::new(0.0, 1.0)).latency
     };
     assert_eq!([at(0), at(5)], [late[0], 0.0]);
+}
+
+#[test]
+fn of_several_joints_each_is_late_by_its_own_rate() {
+    // Two slides one on the other: every point of the shape moves as far as both of them.
+    let mut robot = with_joint(with_joint(bare_robot(), true), true);
+    robot = with_body(robot, 0, Isometry3::identity(), [1.0, 0.0, 0.0], (0, 1.0, 0.0));
+    robot = with_body(robot, 1, Isometry3::identity(), [0.0, 0.0, 1.0], (1, -1.0, 0.0));
+    robot = with_shape(robot, 2, Isometry3::identity(), Convex::Sphere { radius: 0.1 });
+    let rates = [[1.0, 0.0], [0.0, 0.0], [0.0, 0.0], [0.0, 2.0], [0.0, 0.0]];
+    let held: Vec<Twist> = rates.iter().map(|rates| (0.0, 0.0, rates.to_vec())).collect();
+    let (table, task) = commands(&robot, Pose2::default(), &[0.0; 2], 0.1, &held);
+    let rollout = Rollout::new(&table, task.start, &[0.0; 2]);
+    let tube = Tube::new(&rollout, &robot, Tolerance { latency: 0.05, ..Tolerance::default() });
+    let late: Vec<f64> = (0..table.rows.len()).map(|row| tube.late(row)).collect();
+    for (late, expected) in late.iter().zip([0.05, 0.05, 0.1, 0.1, 0.1, 0.0]) {
+        assert!((late - expected).abs() < 1e-9, "{late} {expected}");
+    }
+}
+
+proptest! {
+    /// What one tolerance alone brings a point of the base nearer, by differences of replays.
+    #[test]
+    fn shares_are_how_far_points_of_robots_are_off_by_one_tolerance_alone(
+        (start, _, step, held) in any_motion(), place in [-1.0..1.0, -1.0..1.0f64], toward in [-0.7..0.7, -0.7..0.7f64],
+    ) {
+        let robot = bare_robot();
+        let held: Vec<Twist> = held.into_iter().map(|(v, w, _)| (v, w, Vec::new())).collect();
+        let (table, _) = commands(&robot, start, &[], step, &held);
+        let rollout = Rollout::new(&table, start, &[]);
+        const SMALL: f64 = 1e-6;
+        let tolerance = Tolerance {
+            wheel_radius: SMALL, wheel_difference: SMALL, track: SMALL / (1.0 + SMALL), start_angle: SMALL, start_distance: SMALL,
+            latency: 0.0,
+        };
+        let (row, tau) = (held.len() - 1, 0.4 * step);
+        let toward = nalgebra::Vector2::from(toward);
+        let model = rollout.pose(row, tau);
+        let at = |own: &CommandTable, from: Pose2| {
+            let (speed, turn_rate) = own.twist(row);
+            let pose = own.replay(from)[row].after_twist(speed, turn_rate, tau);
+            // The point that the model has at `place`.
+            let local = nalgebra::Rotation2::new(-model.yaw) * nalgebra::Vector2::new(place[0] - model.x, place[1] - model.y);
+            nalgebra::Vector2::new(pose.x, pose.y) + nalgebra::Rotation2::new(pose.yaw) * local
+        };
+        let off = |change: &dyn Fn(&mut CommandTable, &mut Pose2, f64)| {
+            let points = [1.0, -1.0].map(|sign| {
+                let (mut own, mut from) = (table.clone(), start);
+                change(&mut own, &mut from, sign * SMALL);
+                at(&own, from)
+            });
+            (0.5 * (points[0] - points[1])).dot(&toward).abs()
+        };
+        let shares = Tube::new(&rollout, &robot, tolerance).shares((row, tau), 0, place.into(), toward);
+        let turned = |_: &mut CommandTable, from: &mut Pose2, small: f64| from.yaw += small;
+        let uneven = |own: &mut CommandTable, _: &mut Pose2, small: f64| own.rows.iter_mut().for_each(|row| {
+            row.wheel_left *= 1.0 - 0.5 * small;
+            row.wheel_right *= 1.0 + 0.5 * small;
+        });
+        for (share, expected) in [
+            (shares.wheel_radius, off(&|own, _, small| own.wheel_radii.mean *= 1.0 + small)),
+            (shares.track, off(&|own, _, small| own.track_width /= 1.0 + small)),
+            (shares.wheel_difference, off(&uneven)),
+            (shares.start_angle, off(&turned)),
+            (shares.start_distance, SMALL * toward.norm()),
+        ] {
+            prop_assert!((share - expected).abs() < 5e-12, "{share} {expected}: {shares:?}");
+        }
+    }
+}
+
+/// A shape of the robot's in the tube, and as the model has it, `tau` seconds into the first row; bounds hold for `half` seconds around.
+fn in_tube<'a>(
+    robot: &'a RobotModel,
+    (rollout, tube): (&Rollout<'_>, &Tube<'_>),
+    (tau, half): (f64, f64),
+) -> [MovingShape<'a>; 2] {
+    let kinematics = Kinematics::new(robot);
+    let (mut joints, mut bodies) = (Vec::new(), Vec::new());
+    rollout.extreme_joints(0, &mut joints);
+    let acceleration = kinematics.acceleration(0, rollout.held(0), &joints);
+    rollout.joints_at(0, tau, &mut joints);
+    kinematics.bodies(&joints, rollout.held(0), &mut bodies);
+    let own = kinematics.shape(0, &bodies, rollout.pose(0, tau), acceleration);
+    let mut loose = own;
+    tube.loosen(0, &mut loose, (0, tau), half);
+    [loose, own]
+}
+
+/// How fast the tube around a shape is taken to grow within `half` seconds, m/s.
+fn growth([loose, own]: &[MovingShape<'_>; 2], half: f64) -> f64 {
+    (loose.motion(half) - own.motion(half)) / half
+}
+
+/// One point on a slide along the base's x axis: by how much farther the tube lets it be grows no faster than is said. In the cases without
+/// a name the parts of that growth add up along one direction, so that nothing is to spare.
+#[test]
+fn the_tube_around_a_point_grows_no_faster_than_is_said() {
+    let mut robot = with_joint(bare_robot(), true);
+    robot = with_body(robot, 0, Isometry3::identity(), [1.0, 0.0, 0.0], (0, 1.0, 0.0));
+    robot = with_shape(robot, 1, Isometry3::identity(), Convex::Hull { vertices: vec![[0.0; 3]] });
+    let none = Tolerance::default();
+    let all = Tolerance { wheel_radius: 0.1, wheel_difference: 0.1, track: 0.3, start_angle: 0.3, ..none };
+    let turned = Tolerance { start_angle: 0.4, ..none };
+    let half = 0.1;
+    for (speed, turn_rate, slide, tolerance) in [
+        (0.0, 0.0, 2.0, turned),
+        (-2.0, 0.0, 2.0, turned),
+        (2.0, 0.0, 0.0, turned),
+        (2.0, 0.0, 0.0, Tolerance { wheel_radius: 0.2, ..turned }),
+        (0.0, 2.0, 0.0, all),
+        (1.0, -1.0, 2.0, all),
+        (-1.0, 3.0, 0.5, all),
+    ] {
+        // Half the way through the row the slide is in.
+        let start = [-slide * half];
+        let held = [(speed, turn_rate, vec![slide])];
+        let (table, task) = commands(&robot, Pose2::new(0.3, 0.2, 0.4), &start, 2.0 * half, &held);
+        let rollout = Rollout::new(&table, task.start, &start);
+        let tube = Tube::new(&rollout, &robot, tolerance);
+        let middle = in_tube(&robot, (&rollout, &tube), (half, half));
+        let rate = growth(&middle, half);
+        for direction in 0..32 {
+            let angle = 0.4 + std::f64::consts::TAU * f64::from(direction) / 32.0;
+            let normal = Vector3::new(real::cos(angle), real::sin(angle), 0.0);
+            // A point has no reach of its own.
+            let now = middle[0].posed.reach(&normal);
+            for part in [-1.0, -0.5, 0.0, 0.5, 1.0] {
+                let [then, _] = in_tube(&robot, (&rollout, &tube), (half + part * half, 0.0));
+                let (far, said) = (then.posed.reach(&normal), now + rate * half * f64::abs(part));
+                assert!(far <= said + 1e-12, "{speed} {turn_rate} {slide}: {far} above {said} along {angle}");
+            }
+        }
+    }
+}
+
+/// In a spin a point a metre from its shape's middle is off by a metre times what the heading is.
+#[test]
+fn the_tube_of_a_spin_grows_with_the_radius_of_a_shape() {
+    let robot = with_shape(bare_robot(), 0, Isometry3::identity(), Convex::Hull { vertices: vec![[1.0, 0.0, 0.0]] });
+    let half = 1e-5;
+    let (table, task) = commands(&robot, Pose2::default(), &[], 2.0 * half, &[(0.0, 1.0, vec![])]);
+    let rollout = Rollout::new(&table, task.start, &[]);
+    let tube = Tube::new(&rollout, &robot, Tolerance { wheel_radius: 0.1, track: 0.2, ..Tolerance::default() });
+    let rate = growth(&in_tube(&robot, (&rollout, &tube), (half, half)), half);
+    let turning = (tube.width(0, 2.0 * half).angle - tube.width(0, half).angle) / half;
+    assert!(rate >= turning - 1e-9 && rate < 1.001 * turning, "{rate} {turning}");
+}
+
+/// The turn of a shape is taken as a shift along tangents; where its points come nearer to the middle than that is in the disc.
+#[test]
+fn a_corner_that_starts_at_another_angle_is_in_the_tube_inwards_too() {
+    for (place, corner) in [(0.0, 0.3), (0.5, 0.3), (0.5, 0.0)] {
+        let shape = Convex::Hull { vertices: vec![[corner, 0.0, 0.0]] };
+        let robot = with_shape(bare_robot(), 0, Isometry3::translation(place, 0.0, 0.0), shape);
+        let (table, task) = commands(&robot, Pose2::default(), &[], 0.1, &[(0.0, 0.0, vec![])]);
+        let rollout = Rollout::new(&table, task.start, &[]);
+        let angle: f64 = 0.4;
+        let tube = Tube::new(&rollout, &robot, Tolerance { start_angle: angle, ..Tolerance::default() });
+        let [loose, _] = in_tube(&robot, (&rollout, &tube), (0.05, 0.05));
+        let far = (place + corner) * real::cos(angle);
+        let bound = place - loose.posed.reach(&-Vector3::x());
+        assert!(bound <= far && bound > far - 0.03 * (place + corner), "{place} {corner}: {bound} {far}");
+        assert_eq!(growth(&in_tube(&robot, (&rollout, &tube), (0.05, 0.05)), 0.05), 0.0, "it stands");
+    }
+}
+
+/// After a small spin of a robot whose wheels are larger and nearer to each other, what two deviations make together is most of what the
+/// first order leaves out.
+#[test]
+fn a_point_before_a_base_that_spins_is_in_the_tube_with_two_deviations_together() {
+    let shape = Convex::Hull { vertices: vec![[0.0; 3]] };
+    let robot = with_shape(bare_robot(), 0, Isometry3::translation(1.0, 0.0, 0.0), shape);
+    let (turned, step) = (0.05, 0.1);
+    let (table, task) = commands(&robot, Pose2::default(), &[], step, &[(0.0, turned / step, vec![])]);
+    let rollout = Rollout::new(&table, task.start, &[]);
+    let tolerance = Tolerance { wheel_radius: 0.1, track: 0.4, ..Tolerance::default() };
+    let tube = Tube::new(&rollout, &robot, tolerance);
+    let [loose, _] = in_tube(&robot, (&rollout, &tube), (step, 0.0));
+    let aside = Vector3::new(-real::sin(turned), real::cos(turned), 0.0);
+    // Such a robot turns (1 + 0.1) / (1 - 0.4) times as far.
+    let more = turned * (1.1 / 0.6 - 1.0);
+    let bound = loose.posed.reach(&aside);
+    assert!(bound >= real::sin(more) && bound < more + more * more, "{bound} {more}");
+}
+
+#[test]
+fn the_shares_of_a_near_miss_are_those_of_the_point_that_is_nearest() {
+    // The box's corner is at (0.7, 0.1), the cell's at (0.8, 0.2): on the diagonal.
+    let shape = Convex::Box { half: [0.2, 0.1, 0.1] };
+    let mut robot = with_shape(bare_robot(), 0, Isometry3::translation(0.5, 0.0, 0.2), shape);
+    robot.tolerance = Some(Tolerance { start_angle: 0.01, ..Tolerance::default() });
+    let mut map = VoxelMap::new(0.1, [-1.0, -1.0, 0.0], [30, 30, 5], Unknown::Free);
+    map.occupy([18, 12, 2]);
+    let (table, task) = commands(&robot, Pose2::default(), &[], 0.1, &[(0.0, 0.0, vec![])]);
+    let certificate = certify(&table, &robot, Some(&map), &task);
+    assert!(certificate.holds(), "{:?}", certificate.refusals);
+    let (_, shares) = certificate.tolerance.and_then(|t| t.there).expect("near");
+    // A small turn moves the corner along (-0.1, 0.7).
+    assert!((shares.start_angle - 0.01 * 0.6 / 2f64.sqrt()).abs() < 1e-7, "{shares:?}");
+}
+
+/// 524 km from the origin a distance of 7.5 nm is less than rounding: what cannot be told from touching counts as it.
+#[test]
+fn trust_ends_where_rounding_could_hide_a_contact() {
+    let far = 524_288.0;
+    let robot = with_shape(bare_robot(), 0, Isometry3::translation(0.0, 0.0, 0.5), Convex::Box { half: [0.25; 3] });
+    let mut map = VoxelMap::new(0.125, [far, far, 0.0], [64, 64, 8], Unknown::Free);
+    map.occupy([38, 32, 4]);
+    for (gap, contact) in [(real::powi(2.0, -27), Some(0)), (real::powi(2.0, -20), None)] {
+        let (table, task) = commands(&robot, Pose2::new(far + 4.5 - gap, far + 4.0, 0.0), &[], 0.1, &[]);
+        assert_eq!(trust(&table, &robot, Some(&map), &task, Tolerance::default()).expect("a row").contact, contact);
+    }
 }
 
 /// 9 m of all kinds: straight, a spin there and a spin back, bends both ways, backwards; and where it starts.

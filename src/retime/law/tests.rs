@@ -98,3 +98,38 @@ fn wheel_is_the_optimum_where_curvature_keeps_its_sign() {
         assert!(after > time(name, TimeLaw::Optimal).duration() * (1.0 - 1e-3));
     }
 }
+
+#[test]
+fn what_a_law_takes_at_least_is_less_than_it_takes_and_not_by_much() {
+    let robot = fixtures::conv();
+    for name in ["c_curve", "s_curve", "arbitrary"] {
+        let (curved, task) = (course(&path(name)), task(&robot, false));
+        for law in [TimeLaw::Eq5, TimeLaw::FixedPoint] {
+            let taken = time_leg(&Course::Curved(curved.clone()), law, task).unwrap().duration();
+            let least = least_duration(&curved, law, task);
+            assert!(least <= taken * (1.0 + 1e-12) && least > 0.7 * taken, "{name} {law:?}: {least} {taken}");
+        }
+    }
+}
+
+#[test]
+fn a_law_without_its_timing_is_refused_leg_by_leg() {
+    let robot = fixtures::conv();
+    let course = Course::Curved(course(&path("c_curve")));
+    let refused = |law, task| time_leg(&course, law, task).err();
+    assert_eq!(refused(TimeLaw::Minco, task(&robot, false)), Some(RetimeError::NoOwnTiming));
+    let several = Task { one_segment: false, ..task(&robot, false) };
+    assert_eq!(refused(TimeLaw::Printed, several), Some(RetimeError::PrintedNeedsOneSegment));
+    assert_eq!(refused(TimeLaw::Minco, task(&robot, true)), None);
+}
+
+#[test]
+fn a_legs_breaks_go_from_its_start_to_its_end() {
+    let robot = fixtures::conv();
+    for law in [TimeLaw::Eq5, TimeLaw::FixedPoint, TimeLaw::Printed, TimeLaw::Optimal, TimeLaw::Minco] {
+        let leg = time_leg(&Course::Curved(course(&path("arbitrary"))), law, task(&robot, true)).unwrap();
+        let breaks = leg.breaks();
+        assert!(breaks[0].abs() < 1e-12 && (breaks[breaks.len() - 1] / leg.duration() - 1.0).abs() < 1e-12, "{law:?}");
+        assert!(breaks.windows(2).all(|pair| pair[0] <= pair[1]));
+    }
+}

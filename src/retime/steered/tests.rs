@@ -188,3 +188,84 @@ fn a_message_says_where_the_base_stands_and_what_to_use() {
     let diagnostic = timed(&all_kinds(), TimeLaw::FixedPoint).unwrap_err().diagnostic();
     assert!(diagnostic.message.contains("fixed_point") && diagnostic.hint.is_some_and(|h| h.contains("minco")));
 }
+
+#[test]
+fn what_is_held_in_each_row_is_what_is_moved_in_it() {
+    for (trajectory, law) in [(all_kinds(), TimeLaw::Minco), (all_kinds(), TimeLaw::Auto), (bend(), TimeLaw::Eq5)] {
+        let profile = timed(&trajectory, law).unwrap();
+        let (steps, mut before) = (700, profile.at(0.0));
+        let hold = profile.time() / steps as f64;
+        for (k, mean) in profile.mean_speeds(steps).iter().enumerate() {
+            let now = profile.at((k + 1) as f64 * hold);
+            let moved = |a: &crate::retime::MotionState, b: &crate::retime::MotionState| {
+                [b.wheels[0][0] - a.wheels[0][0], b.wheels[1][0] - a.wheels[1][0], b.joints[0][0] - a.joints[0][0]]
+            };
+            for (moved, mean) in moved(&before, &now).iter().zip(mean) {
+                assert!((moved - hold * mean).abs() < 1e-9, "{law:?} row {k}");
+            }
+            before = now;
+        }
+    }
+}
+
+fn steered(trajectory: &Trajectory) -> Steered {
+    let [Leg::Steer(leg)] = trajectory.legs.as_slice() else { panic!("one leg") };
+    match Course::steer(leg, fixtures::scr_db().track_width).unwrap() {
+        Course::Steered(steered) => steered,
+        _ => panic!("not in proportion"),
+    }
+}
+
+#[test]
+fn a_way_that_turns_changes_its_direction_or_stands_is_no_straight_line() {
+    // Seconds 0 to 2: a spin; to 7: a bend; to 11: backwards; to 12: the blade alone; to 15: straight forward.
+    let all = steered(&all_kinds());
+    for (from, to, expected) in [
+        (0.8, 1.2, true),   // spins
+        (0.05, 0.1, true),  // so slowly that it does not turn far; but it stands
+        (3.0, 6.0, true),   // turns by more than a tenth
+        (4.4, 4.5, false),  // by less
+        (6.9, 7.1, true),   // the cusp
+        (11.2, 11.8, true), // stands
+        (12.5, 14.5, false),
+    ] {
+        assert_eq!(all.turns_or_stands([from, 0.5 * (from + to), to]), expected, "{from} to {to}");
+    }
+}
+
+#[test]
+fn the_fixed_point_is_the_speed_at_which_the_faster_wheel_is_at_its_limit_in_the_tightest_bend() {
+    // Straight, then a bend, so that curvature is not the same all along.
+    for trajectory in [bend(), steps(&[[5.0, 2.5, 1.4, 0.3]])] {
+        let (steered, robot) = (steered(&trajectory), fixtures::scr_db());
+        let curve = &steered.curve;
+        let bends = (20..=19_980).map(|i| {
+            let place = curve.place(curve.duration() * f64::from(i) / 20_000.0);
+            (curve.jet(0, place)[1] / curve.jet(1, place)[1]).abs()
+        });
+        let tightest = bends.fold(0.0, f64::max);
+        assert!((steered.largest_curvature() / tightest - 1.0).abs() < 1e-4, "{}", steered.largest_curvature());
+        let profile = timed(&trajectory, TimeLaw::FixedPoint).unwrap();
+        let expected = 0.5 / (1.0 + 0.5 * robot.track_width * tightest);
+        assert!((profile.v_max() - expected).abs() < 1e-4, "{} {expected}", profile.v_max());
+        assert!((profile.v_max() + profile.v_comp() - 0.5).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn near_its_rests_a_leg_of_the_distance_is_as_fast_as_its_places_say() {
+    let profile = timed(&bend(), TimeLaw::FixedPoint).unwrap();
+    let leg = &profile.legs()[0];
+    let margin = NEAR_REST * leg.duration();
+    for t in [0.3, 0.6, 0.9].into_iter().flat_map(|share| [share * margin, leg.duration() - share * margin]) {
+        let h = 0.02 * margin;
+        let (mut low, mut high, mut rates) = (Vec::new(), Vec::new(), Vec::new());
+        leg.positions(t - h, &mut low);
+        leg.positions(t + h, &mut high);
+        leg.rates(t, &mut rates);
+        for side in 0..2 {
+            let slope = (high[side] - low[side]) / (2.0 * h);
+            assert!((rates[side][0] / slope - 1.0).abs() < 0.02, "{} {slope} at {t}", rates[side][0]);
+        }
+    }
+}
