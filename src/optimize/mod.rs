@@ -49,7 +49,7 @@ pub fn resume<F: DistanceField>(
     refused: &Trajectory,
 ) -> Trajectory {
     let from = match &refused.legs[..] {
-        [Leg::Steer(leg)] => Some(leg),
+        [Leg::Steer(leg)] => Some((leg, refused.optimiser.map_or(1.0, |outcome| outcome.slowed))),
         _ => None,
     };
     match options.parameterisation {
@@ -80,7 +80,7 @@ fn optimize_flat<F: DistanceField>(
 ) -> Trajectory {
     let context = Context::new(robot, field, options);
     let mut legs = Vec::new();
-    let mut outcome = OptimiserOutcome { pieces: 0, iterations: 0, ending: Ending::Converged, cost: 0.0 };
+    let mut outcome = OptimiserOutcome { pieces: 0, iterations: 0, ending: Ending::Converged, cost: 0.0, slowed: 1.0 };
     for section in sections(path, 0, path.moves.len(), &context.limits, context.thresholds) {
         match section {
             Section::Still(leg) => legs.push(Leg::Still(leg)),

@@ -186,6 +186,7 @@ fn joined_trajectories(stretches: &[(Made, bool)]) -> Trajectory {
         iterations: a.iterations + b.iterations,
         ending: a.ending.max(b.ending),
         cost: a.cost + b.cost,
+        slowed: a.slowed.max(b.slowed),
     });
     Trajectory {
         legs: stretches.iter().flat_map(|(made, _)| made.trajectory.legs.clone()).collect(),

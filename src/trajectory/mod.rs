@@ -59,6 +59,8 @@ pub struct OptimiserOutcome {
     pub ending: Ending,
     /// Final cost, summed over legs.
     pub cost: f64,
+    /// How many times as long as in that cost all durations are, for a gentler timing; 1 where there is none of its own.
+    pub slowed: f64,
 }
 
 /// How an iteration ended; worse endings compare greater.

@@ -18,6 +18,8 @@ const USED: f64 = 0.8;
 /// Longest piece on a straight, m; with joints that move; with joints, seconds of a joint's full speed a piece.
 const LONGEST: f64 = 2.5;
 const LONGEST_MOVING: f64 = 0.6;
+/// Shorter straights between corners are shared among them, m: a short piece makes the cost steep.
+const SHORTEST_STRAIGHT: f64 = 0.3;
 /// Parts between bends of the joints' way are at least this long, m.
 const SHORTEST_PART: f64 = 0.1;
 /// Quintics from rest to rest: peak speed and acceleration over distance / T and distance / T^2.
@@ -206,6 +208,7 @@ pub(super) fn guess(path: &SearchPath, limits: &Limits) -> Option<Guess> {
         nodes.push(node);
         links.push(link);
     };
+    let mut tail_before = 0.0;
     for k in 0..=last {
         let corner = &corners[k];
         let at = |i: usize| corner.stands[i].clone();
@@ -261,27 +264,33 @@ pub(super) fn guess(path: &SearchPath, limits: &Limits) -> Option<Guess> {
             cap = speed;
             turn_in = corner.turn().abs();
         }
+        let (mut tail, tail_cap) = match rounding[k + 1] {
+            Some((reach, speed)) => (reach, speed),
+            None => (ramp.min(SHARE * straight.length), cruise),
+        };
+        let mut middle = straight.length - head - tail;
+        let shared = middle < SHORTEST_STRAIGHT && straight.parts(head, middle).len() == 1;
+        if shared {
+            (head, tail, middle) = (head + 0.5 * middle, tail + 0.5 * middle, 0.0);
+            cap = cap.min(tail_cap);
+        }
         let leaving = (heading - nodes[nodes.len() - 1].yaw).abs();
-        let bent = if rounding[k].is_some() { 2.0 * head } else { head };
+        let bent = if rounding[k].is_some() { tail_before + head } else { head };
+        tail_before = tail;
         push(
             &mut nodes,
             &mut links,
             on(head, cap),
             Link { direction: straight.direction, length: bent, turn: turn_in.max(leaving) },
         );
-        let (tail, cap) = match rounding[k + 1] {
-            Some((reach, speed)) => (reach, speed),
-            None => (ramp.min(SHARE * straight.length), cruise),
-        };
-        let middle = straight.length - head - tail;
         let moving =
             (0..limits.joints.len()).any(|j| straight.joints.windows(2).any(|w| (w[1].1[j] - w[0].1[j]).abs() > 1e-9));
-        let parts = straight.parts(head, middle);
+        let parts = if shared { Vec::new() } else { straight.parts(head, middle) };
         for (part, (start, length)) in parts.iter().enumerate() {
             let count = (length / if moving { LONGEST_MOVING } else { LONGEST }).ceil().max(1.0) as usize;
             for i in 1..=count {
                 let d = start + length * i as f64 / count as f64;
-                let cap = if i == count && part + 1 == parts.len() { cap } else { cruise };
+                let cap = if i == count && part + 1 == parts.len() { tail_cap } else { cruise };
                 push(
                     &mut nodes,
                     &mut links,

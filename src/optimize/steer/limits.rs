@@ -2,7 +2,10 @@
 
 use super::hermite::{Basis, DATA};
 use super::integral::{ByData, Integral};
+use super::layout::HEADING;
 use super::problem::Problem;
+use super::rows::{Contact, Limit, Missed, Row, Rows};
+use crate::math::real;
 
 /// Backing up weighs as much as exceeding the speed limit by so many times as much.
 const BACKWARDS: f64 = 10.0;
@@ -10,7 +13,7 @@ const BACKWARDS: f64 = 10.0;
 /// Joints are kept off the ends of their range by this share of half of it: the penalty is soft, the range is not.
 const INSET: f64 = 0.02;
 /// The share of half a joint's range by which a position beyond counts like a speed of twice its limit.
-const STIFF_PART: f64 = 0.2;
+const STIFF_PART: f64 = 0.05;
 
 impl<F> Problem<'_, F> {
     /// Limits of base and wheels: each is linear in one derivative of heading and arc length. At rest the speed is what it is, and
@@ -18,7 +21,7 @@ impl<F> Problem<'_, F> {
     #[allow(clippy::too_many_arguments)]
     pub(super) fn base_limits(
         &mut self,
-        piece: usize,
+        [piece, sample]: [usize; 2],
         rest: bool,
         basis: &Basis,
         heading: &[f64; 4],
@@ -29,10 +32,12 @@ impl<F> Problem<'_, F> {
         let limits = &self.limits;
         let direction = self.directions[piece];
         let arm = limits.half_track;
-        let local = &mut self.local;
+        let (local, contacts) = (&mut self.local, &mut self.contacts);
         let mut cost = 0.0;
         // `by . (heading, arc length)` of an order exceeds its bound by `value`; the sum is homogeneous in time of minus the order.
         let mut row = |order: usize, by: [f64; 2], value: f64, bound: f64| {
+            let of = Missed::Limit(Limit { order, first: HEADING, by, bound });
+            contacts.add_limit(Contact { piece, sample, of, short: value });
             let scaled = by.map(|b| b * rates[order]);
             let jacobian: ByData = std::array::from_fn(|k| scaled[k / DATA] * basis.rows[order][k % DATA]);
             let by_time = 0.5 * value - order as f64 * (value + bound);
@@ -133,14 +138,22 @@ impl<F> Problem<'_, F> {
     }
 
     /// Limits of the joints: speed, acceleration, jerk, position. Leaves the joints' values in `joints`.
-    pub(super) fn joint_limits(&mut self, basis: &Basis, rates: &[f64; 4], weight: f64) -> f64 {
+    pub(super) fn joint_limits(
+        &mut self,
+        [piece, sample]: [usize; 2],
+        basis: &Basis,
+        rates: &[f64; 4],
+        weight: f64,
+    ) -> f64 {
         let mut cost = 0.0;
         for (index, limits) in self.limits.joints.iter().enumerate() {
             let first = DATA * (2 + index);
             let unit = basis.at(&self.data[2 + index]);
             self.joints[index] = unit[0];
-            let local = &mut self.local;
+            let (local, contacts) = (&mut self.local, &mut self.contacts);
             let mut row = |order: usize, factor: f64, value: f64, bound: f64| {
+                let of = Missed::Limit(Limit { order, first: 2 + index, by: [factor, 0.0], bound });
+                contacts.add_limit(Contact { piece, sample, of, short: value });
                 let jacobian = basis.rows[order].map(|b| factor * rates[order] * b);
                 let by_time = 0.5 * value - order as f64 * (value + bound);
                 cost += local.square_of_joint(first, &jacobian, by_time, value, weight);
@@ -158,11 +171,34 @@ impl<F> Problem<'_, F> {
             let (inset, size) = if bounded { (INSET * half_range, STIFF_PART * half_range) } else { (0.0, 1.0) };
             let (lower, upper) = (limits.lower + inset, limits.upper - inset);
             if unit[0] > upper {
-                row(0, 1.0 / size, (unit[0] - upper) / size, 0.0);
+                row(0, 1.0 / size, (unit[0] - upper) / size, upper / size);
             } else if unit[0] < lower {
-                row(0, -1.0 / size, (lower - unit[0]) / size, 0.0);
+                row(0, -1.0 / size, (lower - unit[0]) / size, -lower / size);
             }
         }
         cost
+    }
+
+    /// Adds a limit's row by its piece's own coordinates.
+    pub(super) fn linearise_limit(
+        &self,
+        contact: Contact,
+        limit: Limit,
+        basis: &Basis,
+        duration: f64,
+        time: f64,
+        rows: &mut Rows,
+    ) {
+        let scale = real::powi(time, -(limit.order as i32));
+        let of = || limit.by.into_iter().zip(limit.first..).filter(|(by, _)| *by != 0.0);
+        let reached: f64 = of().map(|(by, dimension)| by * scale * basis.at(&self.data[dimension])[limit.order]).sum();
+        let row = Row { contact, weight: self.weights.motion * duration, value: reached - limit.bound };
+        let jacobian = rows.push(row);
+        for (by, dimension) in of() {
+            for (entry, row) in jacobian[DATA * dimension..].iter_mut().zip(&basis.rows[limit.order]) {
+                *entry = by * scale * row;
+            }
+        }
+        jacobian[self.local.time] = -(limit.order as f64) * reached;
     }
 }

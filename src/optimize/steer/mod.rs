@@ -9,6 +9,7 @@ mod limits;
 mod local;
 mod near;
 mod problem;
+mod rows;
 mod solver;
 mod swing;
 
@@ -34,10 +35,12 @@ use swing::Swing;
 /// How to optimise heading and arc length.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SteerOptions {
-    /// Weight of the jerk (squared, relative to the wheels' and joints' jerk limits) against time; larger is smoother, and slower in
-    /// the optimiser's own timing. Default 200: a mean jerk as small as \[SCR\]'s at its limits. The time law makes up for nearly
-    /// all of it.
+    /// Weight of the jerk (squared, relative to the wheels' and joints' jerk limits) against time; larger is smoother. Default 10: little,
+    /// since the way that takes the least time is sought.
     pub smoothness: f64,
+    /// The same in the optimiser's own timing of the way that it has found: all durations are stretched alike, until time and
+    /// jerk are least. Default 200: a mean jerk as small as \[SCR\]'s at its limits. A time law sets the pace anew.
+    pub own_smoothness: f64,
     /// Weight of a limit overstepped by 100 % for 1 s, s. Default 30.
     pub motion_weight: f64,
     /// Weight of one contour point that misses the clearance by [`OptimizeOptions::clearance_scale`] for 1 s, s. Default 200.
@@ -49,20 +52,21 @@ pub struct SteerOptions {
     pub sample_time: f64,
     /// Steps at most. Default 120.
     pub max_iterations: usize,
-    /// The iteration ends where a step lowers the cost by less than this share. Default 5e-4.
+    /// The iteration ends where a step lowers the cost by less than this share. Default 1e-3.
     pub tolerance: f64,
 }
 
 impl Default for SteerOptions {
     fn default() -> Self {
         Self {
-            smoothness: 200.0,
+            smoothness: 10.0,
+            own_smoothness: 200.0,
             motion_weight: 30.0,
             clearance_weight: 200.0,
             sample_distance: 0.15,
             sample_time: 0.2,
             max_iterations: 120,
-            tolerance: 5e-4,
+            tolerance: 1e-3,
         }
     }
 }
@@ -80,6 +84,8 @@ impl SteerOptions {
     }
 }
 
+/// Most that the own timing is stretched.
+const SLOWEST: f64 = 10.0;
 /// Backing up by less than this is rounding, m/s.
 const BACKING: f64 = 1e-9;
 /// Least speed that is asked of a motion that only drives forwards, as a share of the speed limit: what the penalty is soft by.
@@ -92,19 +98,19 @@ const GAP_TOLERANCE: f64 = 1e-9;
 const END_TOLERANCE: f64 = 1e-8;
 const END_ROUNDS: usize = 4;
 
-/// Smooths a path as one motion from its first state to its last, beginning with a motion that was made of the same path, if there is
-/// one.
+/// Smooths a path as one motion from its first state to its last, beginning with a motion that was made of the same path and the
+/// factor by which it was slowed, if there is one.
 pub fn optimize_steered<F: DistanceField>(
     path: &SearchPath,
     field: &F,
     robot: &RobotModel,
     options: &OptimizeOptions,
-    from: Option<&SteerLeg>,
+    from: Option<(&SteerLeg, f64)>,
 ) -> Trajectory {
     let limits = Limits::new(robot, 1.0);
     let Some(first) = guess(path, &limits) else {
         let leg = still(&path.states[0], &path.states[0]);
-        let outcome = OptimiserOutcome { pieces: 0, iterations: 0, ending: Ending::Converged, cost: 0.0 };
+        let outcome = OptimiserOutcome { pieces: 0, iterations: 0, ending: Ending::Converged, cost: 0.0, slowed: 1.0 };
         return trajectory(Leg::Still(leg), outcome);
     };
     let spacing = options.contour_spacing.unwrap_or_else(|| field.cell().clamp(0.03, 0.08));
@@ -120,8 +126,9 @@ pub fn optimize_steered<F: DistanceField>(
     };
     let layout = first.layout;
     let mut x = first.x;
-    if let Some(leg) = from {
+    if let Some((leg, slowed)) = from {
         take_over(layout, leg, &first.fixed, &mut x);
+        slow(layout, 1.0 / slowed, &mut x);
     }
     let counts: Vec<usize> = (0..layout.pieces).map(|k| samples(layout, k, &x, own, swing.of(layout, k, &x))).collect();
     let mut problem = Problem::new(robot, field, clearance, first.directions, first.fixed, &counts, weights);
@@ -161,9 +168,16 @@ pub fn optimize_steered<F: DistanceField>(
         x[at + 1] += off[1];
         close(&mut problem, &mut x, GAP_TOLERANCE, &mut work);
     }
+    // T k + J k^-5 is least where k^6 = 5 J / T.
+    let jerk = problem.jerk(&x) * own.own_smoothness / own.smoothness;
+    let time: f64 = (0..layout.pieces).map(|piece| real::exp(x[layout.duration(piece)])).sum();
+    let least = real::powf(5.0 * jerk / time, 1.0 / 6.0);
+    let slowed = if least.is_nan() { 1.0 } else { least.clamp(1.0, SLOWEST) };
+    slow(layout, slowed, &mut x);
     let leg = SteerLeg { pose, curve: curve(layout, &x) };
     let ending = if solved.converged { Ending::Converged } else { Ending::IterationLimit };
-    let outcome = OptimiserOutcome { pieces: layout.pieces, iterations: solved.iterations, ending, cost: solved.cost };
+    let outcome =
+        OptimiserOutcome { pieces: layout.pieces, iterations: solved.iterations, ending, cost: solved.cost, slowed };
     trajectory(Leg::Steer(leg), outcome)
 }
 
@@ -192,6 +206,19 @@ fn take_over(layout: Layout, leg: &SteerLeg, fixed: &[bool], x: &mut [f64]) {
             set(layout.duration(node), real::ln(piece.duration));
             time += piece.duration;
         }
+    }
+}
+
+/// Makes all durations so many times as long.
+fn slow(layout: Layout, factor: f64, x: &mut [f64]) {
+    for node in 0..=layout.pieces {
+        for dimension in 0..layout.dimensions {
+            x[layout.state(node, dimension, 1)] /= factor;
+            x[layout.state(node, dimension, 2)] /= factor * factor;
+        }
+    }
+    for piece in 0..layout.pieces {
+        x[layout.duration(piece)] += real::ln(factor);
     }
 }
 

@@ -1,102 +1,14 @@
-//! Contour points near obstacles: what they cost, and what a step does to those that it would push in.
+//! Contour points near obstacles: what they cost, and what a step would do to them.
 
 use std::rc::Rc;
 
 use super::hermite::{Basis, DATA};
 use super::integral::Integral;
-use super::layout::Layout;
+use super::layout::{ARC, HEADING, Layout};
 use super::problem::Problem;
+use super::rows::{Contact, Missed, Row, Rows};
 use crate::math::banded::Banded;
-use crate::optimize::penalty::clearance::{DistanceField, Placement, PointOf, Touch};
-
-/// Contour points of a sample that are remembered: the deepest.
-const DEEPEST: usize = 3;
-
-/// A contour point that misses the clearance at a sample.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Contact {
-    pub piece: usize,
-    pub sample: usize,
-    pub of: PointOf,
-    pub short: f64,
-}
-
-/// Of each sample the deepest contacts, in the order of samples and then of depth.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Contacts {
-    found: Vec<Contact>,
-    /// Where those of the present sample begin.
-    first: usize,
-}
-
-impl Contacts {
-    /// Room for as many as `samples` samples can have.
-    pub fn of_samples(samples: usize) -> Self {
-        Self { found: Vec::with_capacity(DEEPEST * samples), first: 0 }
-    }
-
-    pub fn clear(&mut self) {
-        self.found.clear();
-    }
-
-    pub fn as_slice(&self) -> &[Contact] {
-        &self.found
-    }
-
-    fn next_sample(&mut self) {
-        self.first = self.found.len();
-    }
-
-    fn add(&mut self, contact: Contact) {
-        if self.found.len() < self.first + DEEPEST {
-            self.found.push(contact);
-        } else if let Some(last) = self.found.last_mut().filter(|last| last.short < contact.short) {
-            *last = contact;
-        } else {
-            return;
-        }
-        let mut at = self.found.len() - 1;
-        while at > self.first && self.found[at - 1].short < contact.short {
-            self.found.swap(at - 1, at);
-            at -= 1;
-        }
-    }
-}
-
-/// A linearised limit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Row {
-    pub piece: usize,
-    pub weight: f64,
-    /// Less than 0 where it is kept.
-    pub value: f64,
-}
-
-/// Linearised limits with their derivatives by the unknowns of their pieces.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Rows {
-    pub rows: Vec<Row>,
-    by: Vec<f64>,
-    size: usize,
-}
-
-impl Rows {
-    /// Room for two contacts' worth of each sample.
-    pub fn of_samples(samples: usize, layout: Layout) -> Self {
-        let (count, size) = (2 * DEEPEST * samples, layout.local_size());
-        Self { rows: Vec::with_capacity(count), by: Vec::with_capacity(count * size), size }
-    }
-
-    pub fn clear(&mut self) {
-        self.rows.clear();
-        self.by.clear();
-    }
-
-    /// Derivatives of a row.
-    pub fn by(&self, row: usize) -> &[f64] {
-        &self.by[row * self.size..(row + 1) * self.size]
-    }
-}
+use crate::optimize::penalty::clearance::{DistanceField, Placement, Touch};
 
 impl<F: DistanceField> Problem<'_, F> {
     /// What the contour misses of the clearance at a sample (piece, its sample, sample of all); joints are set.
@@ -114,7 +26,6 @@ impl<F: DistanceField> Problem<'_, F> {
         let at = Placement { position, heading: path.direction(), joints: &self.joints };
         let unit = self.weights.clearance_unit;
         let (near, hessian, contacts) = (&mut self.near, &mut self.near_hessian, &mut self.contacts);
-        contacts.next_sample();
         let mut sum = 0.0;
         self.clearance.visit(self.robot, self.field, at, index, |touch| {
             if sum == 0.0 {
@@ -123,7 +34,7 @@ impl<F: DistanceField> Problem<'_, F> {
             }
             let value = touch.short / unit;
             sum += touch.weight * value * value;
-            contacts.add(Contact { piece, sample, of: touch.of, short: touch.short });
+            contacts.add_point(Contact { piece, sample, of: Missed::Clearance(touch.of), short: touch.short });
             for i in 0..n {
                 let own = touch.weight * by_pose(&touch, i, n, unit);
                 near[i] += value * own;
@@ -165,61 +76,71 @@ impl<F: DistanceField> Problem<'_, F> {
         0.5 * weight * sum
     }
 
-    /// Adds the contacts of the last evaluation, linearised at `x`: what the motion would do to those points.
-    pub fn linearise_contacts(&mut self, x: &[f64], rows: &mut Rows) {
-        let contacts = std::mem::take(&mut self.contacts);
-        for of_piece in contacts.as_slice().chunk_by(|a, b| a.piece == b.piece) {
-            self.linearise(of_piece, x, rows);
+    /// Adds a row for each of these contacts at `x`; they are sorted.
+    pub fn linearise(&mut self, contacts: &[Contact], x: &[f64], rows: &mut Rows) {
+        for of_piece in contacts.chunk_by(|a, b| a.piece == b.piece) {
+            let piece = of_piece[0].piece;
+            let (time, first) = (self.load(piece, x), rows.rows.len());
+            let table = Rc::clone(&self.tables[self.samples[piece].0]);
+            let share = |sample: usize| table.share(sample) * time;
+            for contact in of_piece {
+                let Missed::Limit(limit) = contact.of else { continue };
+                self.linearise_limit(*contact, limit, &table.bases[contact.sample], share(contact.sample), time, rows);
+            }
+            let mut path = Integral::new(1.0 / table.count() as f64);
+            let at = layout_position(self.layout, piece, x);
+            let mut done = 0;
+            let points = of_piece.iter().filter(|contact| matches!(contact.of, Missed::Clearance(_)));
+            for contact in points {
+                while done <= contact.sample {
+                    let basis = &table.bases[done];
+                    path.advance(basis, &basis.at(&self.data[HEADING]), &basis.at(&self.data[ARC]));
+                    done += 1;
+                }
+                self.linearise_point(*contact, &table.bases[contact.sample], &path, at, share(contact.sample), rows);
+            }
+            for row in first..rows.rows.len() {
+                self.by_unknowns(piece, time, rows.by_mut(row));
+            }
         }
-        self.contacts = contacts;
     }
 
-    /// Adds contacts of one piece.
-    fn linearise(&mut self, contacts: &[Contact], x: &[f64], rows: &mut Rows) {
-        let piece = contacts[0].piece;
-        let (layout, size, n) = (self.layout, self.local.size, self.joints.len() + 4);
-        let time = self.load(piece, x);
-        let table = Rc::clone(&self.tables[self.samples[piece].0]);
-        let mut path = Integral::new(1.0 / table.count() as f64);
-        let at = layout.position(piece);
-        let mut of_samples = contacts.chunk_by(|a, b| a.sample == b.sample).peekable();
-        for (sample, basis) in table.bases.iter().enumerate() {
-            path.advance(
-                basis,
-                &basis.at(&self.data[super::layout::HEADING]),
-                &basis.at(&self.data[super::layout::ARC]),
-            );
-            let Some(here) = of_samples.next_if(|here| here[0].sample == sample) else { continue };
-            for (joint, data) in self.joints.iter_mut().zip(&self.data[2..]) {
-                *joint = basis.at(data)[0];
-            }
-            let moved = path.position();
-            let position = [x[at] + moved[0], x[at + 1] + moved[1]];
-            let placement = Placement { position, heading: path.direction(), joints: &self.joints };
-            sample_jacobian(layout, &path, basis, &mut self.jacobian[..n * size]);
-            let unit = self.weights.clearance_unit;
-            let weight = self.weights.clearance * table.share(sample) * time;
-            let (jacobian, first) = (&self.jacobian, rows.rows.len());
-            self.clearance.look(self.robot, self.field, placement, here.iter().map(|c| c.of), |touch| {
-                let from = rows.by.len();
-                rows.by.resize(from + size, 0.0);
-                for i in 0..n {
-                    let own = by_pose(&touch, i, n, unit);
-                    for (value, entry) in rows.by[from..].iter_mut().zip(&jacobian[i * size..(i + 1) * size]) {
-                        *value += own * entry;
-                    }
-                }
-                rows.rows.push(Row { piece, weight: weight * touch.weight, value: touch.short / unit });
-            });
-            for row in first..rows.rows.len() {
-                self.by_unknowns(piece, time, &mut rows.by[row * size..(row + 1) * size]);
-            }
+    /// Adds a contour point's row by its piece's own coordinates.
+    fn linearise_point(
+        &mut self,
+        contact: Contact,
+        basis: &Basis,
+        path: &Integral<'_>,
+        start: [f64; 2],
+        duration: f64,
+        rows: &mut Rows,
+    ) {
+        let Missed::Clearance(of) = contact.of else { return };
+        let (size, n) = (self.local.size, self.joints.len() + 4);
+        for (joint, data) in self.joints.iter_mut().zip(&self.data[2..]) {
+            *joint = basis.at(data)[0];
         }
+        let moved = path.position();
+        let position = [start[0] + moved[0], start[1] + moved[1]];
+        let placement = Placement { position, heading: path.direction(), joints: &self.joints };
+        let jacobian = &mut self.jacobian[..n * size];
+        sample_jacobian(self.layout, path, basis, jacobian);
+        let unit = self.weights.clearance_unit;
+        let weight = self.weights.clearance * duration;
+        self.clearance.look(self.robot, self.field, placement, [of].into_iter(), |touch| {
+            let by = rows.push(Row { contact, weight: weight * touch.weight, value: touch.short / unit });
+            for i in 0..n - 1 {
+                let own = by_pose(&touch, i, n, unit);
+                for (value, entry) in by.iter_mut().zip(&jacobian[i * size..(i + 1) * size]) {
+                    *value += own * entry;
+                }
+            }
+        });
     }
 
     /// Adds half the weighted square of a row to a model.
     pub fn add_row(&self, row: Row, by: &[f64], gradient: &mut [f64], hessian: &mut Banded) {
-        let base = row.piece * self.layout.block();
+        let base = row.contact.piece * self.layout.block();
         for (i, own) in by.iter().enumerate() {
             if *own == 0.0 {
                 continue;
@@ -243,6 +164,12 @@ fn by_pose(touch: &Touch<'_>, index: usize, count: usize, unit: f64) -> f64 {
         i if i + 1 == count => 0.5 * touch.short / unit,
         i => touch.by_joints[i - 3] / unit,
     }
+}
+
+/// Where a piece begins.
+fn layout_position(layout: Layout, piece: usize, x: &[f64]) -> [f64; 2] {
+    let at = layout.position(piece);
+    [x[at], x[at + 1]]
 }
 
 /// Rows (x, y, heading, joints, logarithm of the duration) by the local coordinates.

@@ -14,7 +14,7 @@ use super::hermite::{Basis, DATA, jerk_energy};
 use super::integral::Integral;
 use super::layout::{ARC, HEADING, Layout};
 use super::local::Local;
-use super::near::Contacts;
+use super::rows::Contacts;
 use crate::math::banded::Banded;
 use crate::math::real;
 use crate::optimize::penalty::Limits;
@@ -301,10 +301,12 @@ impl<'a, F: DistanceField> Problem<'a, F> {
             let [cos, sin] = path.direction();
             let pull = multiplier[0] * cos + multiplier[1] * sin;
             self.local.bend(&basis.rows[0], -share * arc[1] * pull);
+            self.contacts.next_sample();
             let rest = (piece == 0 && sample == 0) || (piece + 1 == layout.pieces && sample == count);
-            cost += self.base_limits(piece, rest, basis, &heading, &arc, &rates, weight * self.weights.motion);
+            cost +=
+                self.base_limits([piece, sample], rest, basis, &heading, &arc, &rates, weight * self.weights.motion);
             cost += self.zone_limit(piece, basis, &arc, &rates, &path, start, weight * self.weights.motion);
-            cost += self.joint_limits(basis, &rates, weight * self.weights.motion);
+            cost += self.joint_limits([piece, sample], basis, &rates, weight * self.weights.motion);
             cost += self.clearance_at([piece, sample, first + sample], basis, &path, start, weight);
         }
         let reached = path.position();
@@ -319,6 +321,16 @@ impl<'a, F: DistanceField> Problem<'a, F> {
             self.by_unknowns(piece, time, jacobian);
         }
         (cost, gap)
+    }
+
+    /// What the jerk costs.
+    pub fn jerk(&mut self, x: &[f64]) -> f64 {
+        let pieces = 0..self.layout.pieces;
+        let of = |piece: usize| {
+            let time = self.load(piece, x);
+            self.jerks(time)
+        };
+        pieces.map(of).sum()
     }
 
     /// Squared jerk of every dimension.

@@ -2,11 +2,15 @@
 //!
 //! A step minimises the Gauss-Newton model of the costs plus a stiff square of the linearised gaps, so it is that of sequential
 //! quadratic programming with multipliers (J. Nocedal, S. Wright, *Numerical Optimization*, 2nd ed., sections 17.3, 18.3). It is
-//! judged by the augmented Lagrangian with the multipliers that the step itself gives. The model does not know limits that are
-//! still kept; where a step has pushed contour points into obstacles, it is made again with those points in the model.
+//! judged by the augmented Lagrangian with the multipliers that the step itself gives.
+//!
+//! Costs are squares of what exceeds a limit, so the model must know which limits the step will exceed: those that are exceeded
+//! here, and of those that are kept the ones that the last step met, gave up, or broke. Which of them the step exceeds is found by
+//! a primal-dual active set (M. Hintermueller, K. Ito, K. Kunisch, *The primal-dual active set strategy as a semismooth Newton
+//! method*, SIAM J. Optim. 13, 2002). A step that breaks others is made again with them in the model.
 
-use super::near::Rows;
 use super::problem::{Derivatives, Problem, STIFFNESS};
+use super::rows::{self, Contact, Rows};
 use crate::math::banded::Banded;
 use crate::optimize::penalty::clearance::DistanceField;
 
@@ -37,6 +41,17 @@ const DIAGONAL_SHARE: f64 = 0.01;
 /// The iteration ends where a step lowers the merit little and leaves gaps below this, m.
 const SMALL_GAP: f64 = 1e-4;
 
+/// How often a step is made before it is damped more.
+const ATTEMPTS: usize = 2;
+/// Damping after a step that was as good as the model says, one that was much worse, any other; and after one that was refused.
+const TRUSTED: f64 = 0.5;
+const DOUBTED: f64 = 3.0;
+const USUAL: f64 = 0.6;
+const REFUSED: f64 = 5.0;
+/// Rounds in which a step finds out which limits it exceeds; from which round on it lets go of none.
+const ROUNDS: usize = 8;
+const LAST_DROPS: usize = 4;
+
 /// Scratch memory; once there, iterating allocates nothing.
 pub(super) struct Workspace {
     here: Derivatives,
@@ -49,7 +64,10 @@ pub(super) struct Workspace {
     natural: Vec<f64>,
     multipliers: Vec<[f64; 2]>,
     next_multipliers: Vec<[f64; 2]>,
-    /// Points that a first attempt has pushed into obstacles, and which of them are in the model.
+    /// What is missed here.
+    missed: Vec<Contact>,
+    /// What else a step may miss; linearised, and what of it the step does miss.
+    watched: Vec<Contact>,
     rows: Rows,
     taken: Vec<bool>,
 }
@@ -75,32 +93,38 @@ pub(super) fn solve<F: DistanceField>(
     let mut damping = FIRST_DAMPING;
     let mut cost = problem.evaluate(x, &work.multipliers, &mut work.here);
     let mut solved = Solved { cost, iterations: 0, converged: false };
+    work.watched.clear();
+    work.missed.clear();
+    work.missed.extend(problem.contacts.all());
     while solved.iterations < options.max_iterations {
+        work.linearise(problem, x);
         let mut merit = None;
-        work.rows.clear();
-        // The second time with the contour points that the first has pushed into obstacles.
-        for _ in 0..2 {
+        for _ in 0..ATTEMPTS {
             solved.iterations += 1;
             merit = work.attempt(problem, x, cost, damping);
             let Some(found) = &merit else { break };
             if found.accepted() {
                 break;
             }
-            if problem.contacts.as_slice().is_empty() {
+            let before = work.watched.len();
+            work.watched.extend(problem.contacts.all());
+            rows::sort(&mut work.watched);
+            if work.watched.len() == before {
                 break;
             }
-            problem.linearise_contacts(x, &mut work.rows);
+            work.linearise(problem, x);
         }
         match merit.filter(Merit::accepted) {
             Some(merit) => {
                 let ratio = (merit.here - merit.there) / (merit.here - merit.predicted);
                 damping *= match ratio {
-                    r if r > 0.75 => 0.33,
-                    r if r < 0.25 => 3.0,
-                    _ => 0.6,
+                    r if r > 0.75 => TRUSTED,
+                    r if r < 0.25 => DOUBTED,
+                    _ => USUAL,
                 };
                 damping = damping.max(1e-9);
                 x.copy_from_slice(&work.trial);
+                work.watch(problem.contacts.all());
                 std::mem::swap(&mut work.here, &mut work.there);
                 std::mem::swap(&mut work.multipliers, &mut work.next_multipliers);
                 cost = merit.cost;
@@ -110,7 +134,7 @@ pub(super) fn solve<F: DistanceField>(
                 }
             }
             None => {
-                damping *= 8.0;
+                damping *= REFUSED;
                 let hopeless = merit.is_some_and(|m| (m.here - m.predicted).abs() <= 1e-9 * cost.abs());
                 if damping > 1e8 || hopeless {
                     solved.converged = hopeless;
@@ -159,9 +183,35 @@ impl Workspace {
             natural: problem.natural(),
             multipliers: vec![[0.0; 2]; layout.pieces],
             next_multipliers: vec![[0.0; 2]; layout.pieces],
+            missed: Vec::with_capacity(rows.rows.capacity()),
+            watched: Vec::with_capacity(3 * rows.rows.capacity()),
             taken: Vec::with_capacity(rows.rows.capacity()),
             rows,
         }
+    }
+
+    /// Linearises what is watched.
+    fn linearise<F: DistanceField>(&mut self, problem: &mut Problem<'_, F>, x: &[f64]) {
+        self.rows.clear();
+        problem.linearise(&self.watched, x, &mut self.rows);
+    }
+
+    /// After a step: watches what it has met, and what it may have got rid of; notes what is missed now.
+    fn watch(&mut self, missed: impl Iterator<Item = Contact>) {
+        let met = self.rows.rows.iter().zip(&self.taken).filter(|(_, taken)| **taken).map(|(row, _)| row.contact);
+        self.watched.clear();
+        self.watched.extend(met.chain(self.missed.drain(..)));
+        rows::sort(&mut self.watched);
+        self.missed.extend(missed);
+    }
+
+    /// What the value of a limit that is kept becomes by the step; of others, which the model has already, nothing.
+    fn after<F: DistanceField>(&self, problem: &Problem<'_, F>, row: usize) -> f64 {
+        let of = &self.rows.rows[row];
+        if of.value >= 0.0 {
+            return 0.0;
+        }
+        of.value + problem.along(of.contact.piece, self.rows.by(row), &self.step)
     }
 
     /// A step from `x` to `trial`; `None` where the model has no minimum.
@@ -173,10 +223,8 @@ impl Workspace {
         damping: f64,
     ) -> Option<Merit> {
         self.taken.clear();
-        for (k, row) in self.rows.rows.iter().enumerate() {
-            self.taken.push(row.value < 0.0 && row.value + problem.along(row.piece, self.rows.by(k), &self.step) > 0.0);
-        }
-        loop {
+        self.taken.resize(self.rows.rows.len(), false);
+        for round in 0..ROUNDS {
             self.factor.copy_from(&self.here.hessian);
             self.gradient.copy_from_slice(&self.here.gradient);
             for (i, natural) in self.natural.iter().enumerate() {
@@ -193,15 +241,13 @@ impl Workspace {
                 *step = -gradient;
             }
             self.factor.solve(&mut self.step);
-            let mut more = false;
-            for (k, row) in self.rows.rows.iter().enumerate() {
-                let after = row.value + problem.along(row.piece, self.rows.by(k), &self.step);
-                if !self.taken[k] && row.value < 0.0 && after > 0.0 {
-                    self.taken[k] = true;
-                    more = true;
-                }
+            let mut changed = false;
+            for row in 0..self.taken.len() {
+                let taken = self.after(problem, row) > 0.0 || (round >= LAST_DROPS && self.taken[row]);
+                changed |= taken != self.taken[row];
+                self.taken[row] = taken;
             }
-            if !more {
+            if !changed {
                 break;
             }
         }
@@ -214,9 +260,9 @@ impl Workspace {
         for ((step, gradient), product) in self.step.iter().zip(&self.here.gradient).zip(&self.product) {
             merit.predicted += step * (gradient + 0.5 * product);
         }
-        for (k, row) in self.rows.rows.iter().enumerate().filter(|(k, _)| self.taken[*k]) {
-            let after = (row.value + problem.along(row.piece, self.rows.by(k), &self.step)).max(0.0);
-            merit.predicted += 0.5 * row.weight * after * after;
+        for row in 0..self.taken.len() {
+            let after = self.after(problem, row).max(0.0);
+            merit.predicted += 0.5 * self.rows.rows[row].weight * after * after;
         }
         for piece in 0..self.multipliers.len() {
             for axis in 0..2 {

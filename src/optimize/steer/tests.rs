@@ -1,6 +1,6 @@
 use super::guess::{Guess, guess};
-use super::near::Rows;
 use super::problem::{Derivatives, Problem, STIFFNESS, Weights};
+use super::rows::{self, Contact, Missed, Rows};
 use super::*;
 use crate::geom::Pose2;
 use crate::math::fd::{numeric_gradient, relative_error};
@@ -62,7 +62,7 @@ fn the_gradient_matches_finite_differences() {
         let multipliers: Vec<[f64; 2]> = (0..first.layout.pieces).map(|k| [0.3 * k as f64, -0.2]).collect();
         let mut at = Derivatives::new(first.layout);
         assert!(problem.evaluate(&x, &multipliers, &mut at) > 20.0);
-        assert!(problem.contacts.as_slice().len() > 5, "{} contour points are near", problem.contacts.as_slice().len());
+        assert!(problem.contacts.points().len() > 5, "{} contour points are near", problem.contacts.points().len());
         assert_gradient(&mut problem, &first, &x, &multipliers, &mut at, [2e-6, 1e-6], |_| true);
     }
 }
@@ -156,7 +156,12 @@ fn the_gradient_where_own_links_are_near_each_other_matches_finite_differences()
     let multipliers = vec![[0.1, -0.2]; first.layout.pieces];
     let mut at = Derivatives::new(first.layout);
     problem.evaluate(&x, &multipliers, &mut at);
-    let near = problem.contacts.as_slice().iter().filter(|contact| matches!(contact.of, PointOf::Pair(_))).count();
+    let near = problem
+        .contacts
+        .points()
+        .iter()
+        .filter(|contact| matches!(contact.of, Missed::Clearance(PointOf::Pair(_))))
+        .count();
     assert!(near > 20, "{near}");
     // Distances are found to 0.1 um, so the way between nearest points to some thousandths. Only joints feel it.
     let block = first.layout.block();
@@ -228,6 +233,66 @@ fn iterating_allocates_nothing() {
 }
 
 #[test]
+fn where_the_iteration_ends_little_is_left_to_gain() {
+    for joints in [0, 1, 2] {
+        let (path, field) = mixed(joints);
+        let robot = robot(joints);
+        let first = guess(&path, &Limits::new(&robot, 1.0)).expect("it moves");
+        let mut problem = problem(&robot, &field, &first);
+        let mut work = Workspace::new(&problem);
+        let mut x = first.x.clone();
+        let usual = SolverOptions { max_iterations: 120, tolerance: 5e-4, gap_tolerance: 1e-9 };
+        let ended = solve(&mut problem, &mut x, &usual, &mut work);
+        assert!(ended.converged, "{joints} joints: {ended:?}");
+        let patient = SolverOptions { max_iterations: 2000, tolerance: 1e-9, gap_tolerance: 1e-9 };
+        let best = solve(&mut problem, &mut x, &patient, &mut work);
+        assert!(ended.cost < 1.01 * best.cost, "{joints} joints: {ended:?} {best:?}");
+    }
+}
+
+#[test]
+fn the_own_timing_is_the_one_of_least_cost_on_the_same_way() {
+    let (path, field) = mixed(1);
+    let robot = robot(1);
+    let made = |own_smoothness: f64| {
+        let mut options = OptimizeOptions { clearance: 0.03, ..Default::default() };
+        options.steer.own_smoothness = own_smoothness;
+        let trajectory = optimize_steered(&path, &field, &robot, &options, None);
+        let [Leg::Steer(leg)] = &trajectory.legs[..] else { panic!("one leg") };
+        (leg.clone(), trajectory.optimiser.expect("optimised").slowed)
+    };
+    let ((quick, one), (gentle, slowed)) = (made(0.0), made(200.0));
+    assert!(one == 1.0 && slowed > 1.1, "{one} {slowed}");
+    let scales = [robot.wheel.planning()[2] / Limits::new(&robot, 1.0).half_track, robot.wheel.planning()[2]];
+    let scales = [scales[0], scales[1], robot.joints[0].limits.planning()[2]];
+    let cost = |factor: f64| {
+        let mut cost = 0.0;
+        for piece in &quick.curve.pieces {
+            let n = 2000;
+            for sample in 0..n {
+                let t = (f64::from(sample) + 0.5) / f64::from(n) * piece.duration;
+                let jerks = piece.coefficients.iter().zip(scales).map(|(c, scale)| {
+                    let jerk = 6.0 * c[3] + 24.0 * c[4] * t + 60.0 * c[5] * t * t;
+                    real::powi(jerk / scale / real::powi(factor, 3), 2)
+                });
+                cost += factor * piece.duration / f64::from(n) * (1.0 + 200.0 * jerks.sum::<f64>());
+            }
+        }
+        cost
+    };
+    assert!(cost(slowed) < cost(0.98 * slowed) && cost(slowed) < cost(1.02 * slowed));
+    for (quick, gentle) in quick.curve.pieces.iter().zip(&gentle.curve.pieces) {
+        assert!((gentle.duration / quick.duration / slowed - 1.0).abs() < 1e-9);
+        for (quick, gentle) in quick.coefficients.iter().zip(&gentle.coefficients) {
+            let ends = [(quick, 1.0), (gentle, slowed)].map(|(c, factor)| {
+                c.iter().enumerate().map(|(power, c)| c * real::powi(0.7 * factor, power as i32)).sum::<f64>()
+            });
+            assert!((ends[0] - ends[1]).abs() < 1e-9, "{ends:?}");
+        }
+    }
+}
+
+#[test]
 fn tension_along_the_way_resists_turning_as_the_hessian_says() {
     let robot = robot(0);
     let path = path(0, &[(0.0, 3.0, 0.0)]);
@@ -258,7 +323,7 @@ fn tension_along_the_way_resists_turning_as_the_hessian_says() {
 }
 
 #[test]
-fn points_linearised_at_a_place_move_as_they_say() {
+fn points_and_limits_linearised_at_a_place_move_as_they_say() {
     let (path, field) = mixed(1);
     let robot = robot(1);
     let first = guess(&path, &Limits::new(&robot, 1.0)).expect("it moves");
@@ -267,27 +332,31 @@ fn points_linearised_at_a_place_move_as_they_say() {
     let mut at = Derivatives::new(first.layout);
     let zero = vec![[0.0; 2]; first.layout.pieces];
     problem.evaluate(&x, &zero, &mut at);
-    let contacts = problem.contacts.as_slice().to_vec();
+    let mut contacts: Vec<Contact> = problem.contacts.all().collect();
+    rows::sort(&mut contacts);
     let rows = |problem: &mut Problem<'_, Boxes>, x: &[f64]| {
         let mut rows = Rows::of_samples(0, first.layout);
-        problem.linearise_contacts(x, &mut rows);
+        problem.linearise(&contacts, x, &mut rows);
         rows
     };
     let here = rows(&mut problem, &x);
     assert_eq!(here.rows.len(), contacts.len());
-    for (row, contact) in here.rows.iter().zip(&contacts) {
-        assert!((row.value - contact.short / WEIGHTS.clearance_unit).abs() < 1e-9);
+    for row in &here.rows {
+        let unit = match row.contact.of {
+            Missed::Clearance(_) => WEIGHTS.clearance_unit,
+            Missed::Limit(_) => 1.0,
+        };
+        assert!((row.value - row.contact.short / unit).abs() < 1e-9, "{row:?}");
     }
+    let limits = here.rows.iter().filter(|row| matches!(row.contact.of, Missed::Limit(_))).count();
+    assert!(limits > 5 && here.rows.len() - limits > 5, "{limits} of {} are limits", here.rows.len());
     // A small step changes each value as its row says; durations too, by what they do to the data.
     let step: Vec<f64> =
         (0..x.len()).map(|i| if first.fixed[i] { 0.0 } else { ((i * 29) % 13) as f64 / 13.0 - 0.5 }).collect();
     let moved = |share: f64| -> Vec<f64> { x.iter().zip(&step).map(|(x, s)| x + share * s).collect() };
     let (up, down) = (rows(&mut problem, &moved(1e-6)), rows(&mut problem, &moved(-1e-6)));
-    let by_time = first.layout.local_time();
     for (k, ((row, up), down)) in here.rows.iter().zip(&up.rows).zip(&down.rows).enumerate() {
-        // The row is of the weighted square's root: its derivative by the duration holds half the value besides.
-        let of_weight = 0.5 * row.value * step[row.piece * first.layout.block() + first.layout.offsets()[by_time]];
-        let slope = problem.along(row.piece, here.by(k), &step) - of_weight;
+        let slope = problem.along(row.contact.piece, here.by(k), &step);
         let numeric = (up.value - down.value) / 2e-6;
         assert!((slope - numeric).abs() < 1e-4 * (1.0 + numeric.abs()), "{slope} {numeric}");
     }
@@ -377,7 +446,7 @@ fn a_motion_that_is_taken_over_is_the_same_and_hardly_changes() {
         assert!(values(a).iter().zip(values(b)).all(|(a, b)| (a - b).abs() < 1e-6 * (1.0 + b.abs())));
     }
     let options = OptimizeOptions { clearance: 0.03, ..Default::default() };
-    let again = optimize_steered(&path, &field, &robot, &options, Some(&leg));
+    let again = optimize_steered(&path, &field, &robot, &options, Some((&leg, outcome.slowed)));
     let after = again.optimiser.expect("optimised");
     assert!(after.iterations < outcome.iterations / 2, "{} of {}", after.iterations, outcome.iterations);
     assert!((after.cost / outcome.cost - 1.0).abs() < 0.01, "{} {}", after.cost, outcome.cost);
@@ -408,7 +477,7 @@ fn a_straight_line_in_the_open_takes_little_more_than_the_trapezoid() {
     let path = path(0, &[(0.0, 6.0, 0.0)]);
     let robot = robot(0);
     let mut options = OptimizeOptions::default();
-    options.steer.smoothness = 0.05;
+    (options.steer.smoothness, options.steer.own_smoothness) = (0.05, 0.05);
     let trajectory = optimize_steered(&path, &Boxes(vec![]), &robot, &options, None);
     let [Leg::Steer(leg)] = &trajectory.legs[..] else { panic!("one leg") };
     // 6 m at 0.5 m/s with ramps of 1 s, and 0.05 s for the jerk of 10 m/s^3.
