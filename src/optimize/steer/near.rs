@@ -88,16 +88,21 @@ impl<F: DistanceField> Problem<'_, F> {
                 self.linearise_limit(*contact, limit, &table.bases[contact.sample], share(contact.sample), time, rows);
             }
             let mut path = Integral::new(1.0 / table.count() as f64);
-            let at = layout_position(self.layout, piece, x);
+            let at = self.layout.position(piece);
+            let start = [x[at], x[at + 1]];
+            let mut bases = table.bases.iter();
             let mut done = 0;
-            let points = of_piece.iter().filter(|contact| matches!(contact.of, Missed::Clearance(_)));
-            for contact in points {
-                while done <= contact.sample {
-                    let basis = &table.bases[done];
-                    path.advance(basis, &basis.at(&self.data[HEADING]), &basis.at(&self.data[ARC]));
-                    done += 1;
+            for of_sample in of_piece.chunk_by(|a, b| a.sample == b.sample) {
+                let sample = of_sample[0].sample;
+                let points = of_sample.partition_point(|contact| matches!(contact.of, Missed::Clearance(_)));
+                if points == 0 {
+                    continue;
                 }
-                self.linearise_point(*contact, &table.bases[contact.sample], &path, at, share(contact.sample), rows);
+                for basis in bases.by_ref().take(sample + 1 - done) {
+                    path.advance(basis, &basis.at(&self.data[HEADING]), &basis.at(&self.data[ARC]));
+                }
+                done = sample + 1;
+                self.linearise_points(&of_sample[..points], &table.bases[sample], &path, start, share(sample), rows);
             }
             for row in first..rows.rows.len() {
                 self.by_unknowns(piece, time, rows.by_mut(row));
@@ -105,17 +110,16 @@ impl<F: DistanceField> Problem<'_, F> {
         }
     }
 
-    /// Adds a contour point's row by its piece's own coordinates.
-    fn linearise_point(
+    /// Adds rows of a sample's contour points by its piece's own coordinates.
+    fn linearise_points(
         &mut self,
-        contact: Contact,
+        contacts: &[Contact],
         basis: &Basis,
         path: &Integral<'_>,
         start: [f64; 2],
         duration: f64,
         rows: &mut Rows,
     ) {
-        let Missed::Clearance(of) = contact.of else { return };
         let (size, n) = (self.local.size, self.joints.len() + 4);
         for (joint, data) in self.joints.iter_mut().zip(&self.data[2..]) {
             *joint = basis.at(data)[0];
@@ -127,8 +131,15 @@ impl<F: DistanceField> Problem<'_, F> {
         sample_jacobian(self.layout, path, basis, jacobian);
         let unit = self.weights.clearance_unit;
         let weight = self.weights.clearance * duration;
-        self.clearance.look(self.robot, self.field, placement, [of].into_iter(), |touch| {
-            let by = rows.push(Row { contact, weight: weight * touch.weight, value: touch.short / unit });
+        let points = contacts.iter().filter_map(|contact| match contact.of {
+            Missed::Clearance(point) => Some(point),
+            Missed::Limit(_) => None,
+        });
+        let mut told = contacts.iter();
+        self.clearance.look(self.robot, self.field, placement, points, |touch| {
+            let Some(contact) = told.find(|contact| contact.of == Missed::Clearance(touch.of)) else { return };
+            let value = touch.short / unit;
+            let by = rows.push(Row { contact: *contact, weight: weight * touch.weight, value });
             for i in 0..n - 1 {
                 let own = by_pose(&touch, i, n, unit);
                 for (value, entry) in by.iter_mut().zip(&jacobian[i * size..(i + 1) * size]) {
@@ -164,12 +175,6 @@ fn by_pose(touch: &Touch<'_>, index: usize, count: usize, unit: f64) -> f64 {
         i if i + 1 == count => 0.5 * touch.short / unit,
         i => touch.by_joints[i - 3] / unit,
     }
-}
-
-/// Where a piece begins.
-fn layout_position(layout: Layout, piece: usize, x: &[f64]) -> [f64; 2] {
-    let at = layout.position(piece);
-    [x[at], x[at + 1]]
 }
 
 /// Rows (x, y, heading, joints, logarithm of the duration) by the local coordinates.
