@@ -135,13 +135,8 @@ pub(super) struct Rows {
 impl Rows {
     /// Room for all contacts of two motions.
     pub fn of_samples(samples: usize, layout: Layout) -> Self {
-        let (count, size) = (Self::most(samples), layout.local_size());
+        let (count, size) = (2 * (DEEPEST + OVERSTEPPED) * samples, layout.local_size());
         Self { rows: Vec::with_capacity(count), by: Vec::with_capacity(count * size), size }
-    }
-
-    /// Contacts that two motions can have.
-    pub fn most(samples: usize) -> usize {
-        2 * (DEEPEST + OVERSTEPPED) * samples
     }
 
     pub fn clear(&mut self) {

@@ -97,9 +97,9 @@ pub(super) fn solve<F: DistanceField>(
     work.missed.clear();
     work.missed.extend(problem.contacts.all());
     while solved.iterations < options.max_iterations {
-        work.linearise(problem, x);
         let mut merit = None;
         for _ in 0..ATTEMPTS {
+            work.linearise(problem, x);
             solved.iterations += 1;
             merit = work.attempt(problem, x, cost, damping);
             let Some(found) = &merit else { break };
@@ -112,7 +112,6 @@ pub(super) fn solve<F: DistanceField>(
             if work.watched.len() == before {
                 break;
             }
-            work.linearise(problem, x);
         }
         match merit.filter(Merit::accepted) {
             Some(merit) => {
