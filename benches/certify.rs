@@ -71,6 +71,7 @@ fn robot() -> RobotModel {
             .map(|blade| IgnoredPair { links: ["base".into(), blade.into()], reason: IgnoreReason::Joined })
             .into(),
         tolerance: None,
+        links: Vec::new(),
     }
 }
 

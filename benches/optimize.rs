@@ -65,6 +65,7 @@ fn robot() -> RobotModel {
         },
         ignore_pairs: Vec::new(),
         tolerance: None,
+        links: Vec::new(),
     }
 }
 

@@ -29,6 +29,7 @@ fn robot() -> RobotModel {
         },
         ignore_pairs: Vec::new(),
         tolerance: None,
+        links: Vec::new(),
     }
 }
 

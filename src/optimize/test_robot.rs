@@ -184,6 +184,7 @@ pub fn robot(joints: usize) -> RobotModel {
             ["blade", "mast"],
         ]),
         tolerance: None,
+        links: Vec::new(),
     }
 }
 

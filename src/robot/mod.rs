@@ -78,6 +78,8 @@ pub struct RobotModel {
     pub bodies: Vec<Body>,
     /// Convex collision shapes.
     pub shapes: Vec<Shape>,
+    /// Every link's frame, in the order of the URDF.
+    pub links: Vec<LinkFrame>,
     /// Of each driving wheel's rim (m/s, m/s^2, m/s^3).
     pub wheel: MotionLimits,
     /// Of the base; shapes the plan.
@@ -204,6 +206,17 @@ pub struct Shape {
     pub convex: Convex,
 }
 
+/// A link's frame, fixed to a body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinkFrame {
+    /// URDF name.
+    pub name: String,
+    /// Index into [`RobotModel::bodies`].
+    pub body: usize,
+    /// body <- link.
+    pub pose: Isometry3<f64>,
+}
+
 /// Frames that are the base, in ROS, where the URDF's root link is in no transform.
 pub const BASE_FRAMES: [&str; 2] = ["base_footprint", "base_link"];
 
@@ -232,6 +245,37 @@ impl RobotModel {
         for body in &self.bodies {
             let pose = body.pose_in_parent(q);
             out.push(if body.motion.is_none() { pose } else { out[body.parent] * pose });
+        }
+    }
+
+    /// Pose of a link (its index) in the base frame at joint values `q`.
+    pub fn link_pose(&self, link: usize, q: &[f64]) -> Isometry3<f64> {
+        let link = &self.links[link];
+        let (mut pose, mut at) = (link.pose, link.body);
+        loop {
+            let body = &self.bodies[at];
+            pose = body.pose_in_parent(q) * pose;
+            if body.motion.is_none() {
+                return pose;
+            }
+            at = body.parent;
+        }
+    }
+
+    /// No posture takes a link's frame farther from the base's origin than this, m.
+    pub fn link_reach(&self, link: usize) -> f64 {
+        let link = &self.links[link];
+        let (mut reach, mut at) = (link.pose.translation.vector.norm(), link.body);
+        loop {
+            let body = &self.bodies[at];
+            reach += body.origin.translation.vector.norm();
+            let Some(motion) = &body.motion else { return reach };
+            if motion.prismatic {
+                let joint = &self.joints[motion.joint];
+                let slid = [joint.lower, joint.upper].map(|q| (motion.multiplier * q + motion.offset).abs());
+                reach += slid[0].max(slid[1]);
+            }
+            at = body.parent;
         }
     }
 
@@ -338,6 +382,9 @@ fn assemble(inputs: RobotInputs<'_>) -> Result<Assembled, Diagnostics> {
     if !faults.is_empty() {
         return Err(Diagnostics(faults));
     }
+    let names = urdf.robot.links.iter().map(|link| link.name.clone());
+    let frame = |(name, (body, pose))| LinkFrame { name, body, pose };
+    let links = names.zip(collapsed.links).map(frame).collect();
     let mut robot = RobotModel {
         name: spec.name.clone().unwrap_or_else(|| urdf.robot.name.clone()),
         wheel_radii: drive.wheel_radii,
@@ -347,6 +394,7 @@ fn assemble(inputs: RobotInputs<'_>) -> Result<Assembled, Diagnostics> {
         joints,
         bodies: collapsed.bodies,
         shapes,
+        links,
         wheel,
         base,
         ignore_pairs: Vec::new(),

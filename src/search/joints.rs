@@ -125,6 +125,7 @@ mod tests {
             base,
             ignore_pairs: vec![],
             tolerance: None,
+            links: Vec::new(),
         };
         let pose = crate::geom::Pose2::default();
         let [start_joints, goal_joints] = [vec![None], vec![None]];

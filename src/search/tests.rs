@@ -12,7 +12,7 @@ use parry3d_f64::shape::{Ball, Cuboid, Cylinder, SharedShape};
 use proptest::prelude::*;
 
 /// The reference robot SCR-DB, built by hand.
-fn scr_db() -> RobotModel {
+pub(super) fn scr_db() -> RobotModel {
     let some = |v| MotionLimits { speed: Some(v), acceleration: Some(2.0 * v), jerk: Some(10.0 * v) };
     let at = |x, y, z| Isometry3::translation(x, y, z);
     let blade = |side: f64| Body {
@@ -68,6 +68,7 @@ fn scr_db() -> RobotModel {
         },
         ignore_pairs: vec![],
         tolerance: None,
+        links: Vec::new(),
     }
 }
 

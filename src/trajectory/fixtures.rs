@@ -25,6 +25,7 @@ pub fn robot(track_width: f64, wheel: [f64; 3], joints: Vec<MovingJoint>) -> Rob
         },
         ignore_pairs: Vec::new(),
         tolerance: None,
+        links: Vec::new(),
     }
 }
 

@@ -38,6 +38,7 @@ pub(crate) fn bare_robot() -> RobotModel {
         },
         ignore_pairs: Vec::new(),
         tolerance: None,
+        links: Vec::new(),
     }
 }
 

@@ -31,6 +31,7 @@ pub fn robot(base_from_root: Isometry3<f64>) -> RobotModel {
         },
         ignore_pairs: Vec::new(),
         tolerance: None,
+        links: Vec::new(),
     }
 }
 

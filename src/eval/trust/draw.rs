@@ -90,6 +90,7 @@ pub(super) fn bare(rng: &mut Rng) -> RobotModel {
         },
         ignore_pairs: Vec::new(),
         tolerance: None,
+        links: Vec::new(),
     }
 }
 

@@ -37,6 +37,7 @@ fn robot() -> RobotModel {
         },
         ignore_pairs: Vec::new(),
         tolerance: None,
+        links: Vec::new(),
     }
 }
 

@@ -66,6 +66,7 @@ fn robot(joint: &str) -> RobotModel {
         // They lie in one another, as far as this page is concerned by design.
         ignore_pairs: [["base", joint], ["base", "drum"], [joint, "drum"]].map(by_design).to_vec(),
         tolerance: None,
+        links: Vec::new(),
     }
 }
 
