@@ -305,4 +305,12 @@ mod tests {
         }
         assert_eq!(Convolution::fastest(9.0, [0.5, 0.2, 0.2]).at(11.0)[3], 0.0);
     }
+
+    #[test]
+    fn however_short_the_distance_it_takes_the_time_of_four_stretches_of_jerk() {
+        for distance in [1e-6, 1e-18, 1e-30, 1e-60] {
+            let time = 4.0 * real::cbrt(distance / 0.4);
+            assert!((Convolution::fastest(distance, PAPER).duration() / time - 1.0).abs() < 1e-14, "{distance}");
+        }
+    }
 }

@@ -309,11 +309,13 @@ fn own(curved: &Curved, task: Task<'_>) -> TimedLeg {
         let breaks: Vec<f64> = leg.breaks().into_iter().filter(|t| (from..=to).contains(t)).collect();
         slow_down(&peaks(&breaks, false, |t, out| leg.rates(t, out)), &limits, task.hold)
     };
-    let middle = {
-        let curve = &curved.curve;
-        let breaks: Vec<f64> = curve.nodes().map(|node| curve.parameter(node)).collect();
-        let own_speed = |u: f64, out: &mut Vec<[f64; 3]>| curved.rates(curve.place(u), [1.0, 0.0, 0.0], out);
-        slow_down(&peaks(&breaks, false, own_speed), &limits, task.hold)
+    let nodes: Vec<f64> = curved.curve.nodes().map(|node| curved.curve.parameter(node)).collect();
+    let own_speed = |u: f64, out: &mut Vec<[f64; 3]>| curved.rates(curved.curve.place(u), [1.0, 0.0, 0.0], out);
+    let asks: Vec<f64> =
+        nodes.windows(2).map(|pair| slow_down(&peaks(pair, false, own_speed), &limits, task.hold)).collect();
+    let between = |from: f64, to: f64| {
+        let within = nodes.windows(2).zip(&asks).filter(|(pair, _)| pair[1] > from && pair[0] < to);
+        within.map(|(_, ask)| *ask).fold(1.0, f64::max)
     };
     let first: Vec<f64> = lengths.iter().map(|r| within([*r, lengths[0]], 0.0, *r)).collect();
     let last: Vec<f64> = lengths
@@ -326,6 +328,7 @@ fn own(curved: &Curved, task: Task<'_>) -> TimedLeg {
     let mut best = (f64::INFINITY, [lengths[0]; 2]);
     for (start, ask_start) in lengths.iter().zip(&first) {
         for (end, ask_end) in lengths.iter().zip(&last) {
+            let middle = between(0.5 * start, seconds - 0.5 * end);
             let time = middle.max(*ask_start).max(*ask_end) * (seconds + 0.5 * (start + end));
             if time < best.0 {
                 best = (time, [*start, *end]);

@@ -149,4 +149,28 @@ mod tests {
         }
         assert!(metric.at(join + 1e-9).1[0] < 0.6 * metric.at(join - 1e-9).1[0]);
     }
+
+    #[test]
+    fn where_the_rate_jumps_cells_are_halved_no_more_than_twelve_times() {
+        let line = Piece { duration: 1.0, coefficients: vec![vec![0.0, 1.0], vec![0.0]] };
+        let curve = PlaneCurve::new(PiecewisePoly { pieces: vec![line] }).unwrap();
+        for jump in [0.3, 0.1, 0.9] {
+            let metric = Metric::new(&curve, |place| [if place.u < jump { 1.0 } else { 2.0 }, 0.0]);
+            let shortest = metric.cells.iter().map(|cell| cell.ends[1] - cell.ends[0]).fold(f64::INFINITY, f64::min);
+            // A node is a quarter of the piece.
+            assert_eq!(shortest, 0.25 / 4096.0);
+        }
+    }
+
+    #[test]
+    fn beyond_its_end_it_stays_there() {
+        let parabola = Piece { duration: 1.0, coefficients: vec![vec![0.0, 1.0], vec![0.0, 0.0, 0.5]] };
+        let curve = PlaneCurve::new(PiecewisePoly { pieces: vec![parabola] }).unwrap();
+        let metric = Metric::new(&curve, |place| {
+            let [g, g1, _] = curve.rates(place).speed;
+            [g, g1]
+        });
+        assert_eq!(metric.at(1.5 * metric.length()), metric.at(metric.length()));
+        assert_eq!(metric.at(-1.0), metric.at(0.0));
+    }
 }

@@ -26,13 +26,13 @@ pub struct Peaks {
 /// Finds the peaks of `rates`, which appends each actuator's (speed, acceleration, jerk) at a time; it is smooth between `breaks`
 /// (ascending; doubles are skipped). `refine`: to rounding; otherwise the largest of the samples.
 pub fn peaks(breaks: &[f64], refine: bool, mut rates: impl FnMut(f64, &mut Vec<[f64; 3]>)) -> Peaks {
-    let span = breaks.last().map_or(0.0, |end| end - breaks[0]);
+    let end = breaks.last().copied().unwrap_or(0.0);
     let (mut times, mut values) = (Vec::new(), Vec::new());
     let mut actuators = 0;
     let mut stretches = 0;
     for pair in breaks.windows(2) {
         let length = pair[1] - pair[0];
-        if length <= 1e-12 * span {
+        if length <= 1e-12 * end {
             continue;
         }
         stretches += 1;
@@ -216,5 +216,71 @@ mod tests {
         assert_eq!(slow_down(&of([9.0, 9.0, 9.0], 0.0), &[[None; 3]], 0.1), 1.0);
         let jumping = slow_down(&of([0.0, 0.0, 0.15], 0.08), &limits, 0.1);
         assert!((0.1 / real::powi(jumping, 3) + 0.6 / real::powi(jumping, 2) - 0.2).abs() < 1e-12);
+    }
+
+    #[test]
+    fn nothing_is_sought_where_the_samples_say_that_it_rises_or_falls_all_along() {
+        let rates: [fn(f64) -> f64; 4] = [|t| t, |t| 1.0 - t, |t| 0.9 + 0.1 * t, |t| 1.0 - 0.1 * t];
+        for rate in rates {
+            let mut asked = 0;
+            let found = peaks(&[0.0, 1.0], true, |t, out| {
+                asked += 1;
+                out.push([rate(t), 0.0, 0.0]);
+            });
+            assert_eq!(asked, SAMPLES + 2);
+            assert!((found.rates[0][0] - 1.0).abs() < 1e-8);
+        }
+    }
+
+    #[test]
+    fn peaks_are_found_to_rounding_long_after_the_start() {
+        let found = peaks(&[1e6, 1e6 + 1.0], true, |t, out| out.push([real::cos(t - 1e6 - 0.41), 0.0, 0.0]));
+        assert!((found.rates[0][0] - 1.0).abs() < 1e-12, "{found:?}");
+    }
+
+    #[test]
+    fn peaks_are_found_to_rounding_in_any_unit() {
+        for (long, large) in [(1e-13, 1.0), (1e-3, 1e4), (1e3, 1e-7), (1e9, 1e-12)] {
+            // The first one between samples, the second one beside a break.
+            for top in [0.41, 0.03] {
+                let found = peaks(&[0.0, long], true, |t, out| out.push([large * real::cos(t / long - top), 0.0, 0.0]));
+                assert!((found.rates[0][0] / large - 1.0).abs() < 1e-12, "{long} {large} {top}: {:?}", found.rates);
+            }
+        }
+    }
+
+    #[test]
+    fn a_jump_is_told_from_rounding_by_the_acceleration() {
+        for (acceleration, jump, counts) in
+            [(0.2, 0.01, true), (0.2, 1e-6, true), (0.2, 1e-8, false), (1e6, 2.0, true), (1e6, 0.5, false)]
+        {
+            let rates = |t: f64| [0.0, if t < 1.0 { acceleration - jump } else { acceleration }, 0.0];
+            let found = peaks(&[0.0, 1.0, 2.0], true, |t, out| out.push(rates(t)));
+            assert_eq!(!found.jumps[0].is_empty(), counts, "{acceleration} {jump}");
+        }
+    }
+
+    #[test]
+    fn the_search_for_a_maximum_stays_in_its_bracket_and_ends_when_it_is_there() {
+        // A parabola whose top is in the middle already, one beside it, and a narrow one far from zero.
+        for (low, width, top, most) in
+            [(4.0, 1.0, 5.0, 0), (4.0, 1.0, 5.3, 2), (1e6, 0.5, 1e6 + 0.7, 3), (3.0, 5e-7, 3.0 + 6e-7, 3)]
+        {
+            let f = |t: f64| 1.0 - ((t - top) / width) * ((t - top) / width);
+            let mut asked = 0;
+            let bracket = [low, low + width, low + 2.0 * width];
+            let found = maximum(bracket, f(bracket[1]), |t| {
+                asked += 1;
+                assert!((bracket[0]..=bracket[2]).contains(&t), "{t}");
+                f(t)
+            });
+            assert!((found - 1.0).abs() < 1e-9 && asked <= 2 + most, "{top}: {found} after {asked}");
+        }
+        // Falling, and as a parabola highest before its bracket.
+        let found = maximum([0.0, 1.0, 2.0], 0.96, |t| {
+            assert!((0.0..=2.0).contains(&t), "{t}");
+            if t < 0.5 { 1.0 } else { 0.9 }
+        });
+        assert_eq!(found, 0.96);
     }
 }

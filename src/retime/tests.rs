@@ -405,6 +405,14 @@ fn a_straight_drive_is_in_proportion_and_is_halfway_with_its_joints_at_half_time
         let place = start.after_twist(sign * 0.6, 0.0, 1.0);
         assert!(middle.pose.distance(place) < 1e-9 && (middle.joints[0][0] - 0.6).abs() < 1e-9);
         assert_eq!(profile.law_name(), "auto");
+        // Nor does it matter how fast the curve's parameter is, or that it would turn back beyond its end.
+        let Leg::Drive(mut uneven) = straight(start, 1.2, reverse, [0.3, 0.9]) else { panic!("a drive") };
+        for row in &mut uneven.curve.pieces[0].coefficients {
+            // Of the change: 0.9 u - 0.2 u^2, which is 1 at 2 s.
+            *row = vec![row[0], 1.8 * row[1], -0.4 * row[1]];
+        }
+        let uneven = super::course(&Leg::Drive(uneven), 0, &robot).unwrap();
+        assert!(matches!(uneven, Course::Proportional(_)));
         // The same curve, but its blade is late by a thousandth, or its end off by as much.
         let Leg::Drive(mut bent) = straight(start, 1.2, reverse, [0.3, 0.9]) else { panic!("a drive") };
         for dimension in [0, 1, 2] {

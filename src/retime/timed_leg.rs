@@ -17,7 +17,7 @@ use super::warp::Warp;
 /// Which quantity of the course is a function of time, and which function.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Clock {
-    /// The share of a proportional course, 0 to 1.
+    /// The share of a proportional course, 0 to 1; of one that does not move, 0.
     Share(Convolution),
     /// Arc length.
     ArcLength(Convolution),
@@ -152,7 +152,7 @@ impl TimedLeg {
         if profile.distance() <= 0.0 {
             return false;
         }
-        let share = profile.between(from / self.stretch, to / self.stretch) / profile.distance();
+        let share = profile.between(from / self.stretch, to / self.stretch);
         out.extend(p.wheel_changes().iter().chain(&p.joint_changes).map(|change| share * change));
         true
     }
@@ -211,9 +211,7 @@ impl TimedLeg {
     fn locate(&self, t: f64) -> At<'_> {
         let at = self.clock.at(t);
         match (&self.course, self.clock.root()) {
-            (Course::Proportional(p), Clock::Share(c) | Clock::ArcLength(c) | Clock::Printed(c)) => {
-                At::Share(p, if c.distance() > 0.0 { at.map(|v| v / c.distance()) } else { at })
-            }
+            (Course::Proportional(p), Clock::Share(_)) => At::Share(p, at),
             (Course::Proportional(p), _) => {
                 debug_assert!(false, "a proportional course has no timing of its own");
                 At::Share(p, [0.0; 4])
@@ -285,3 +283,6 @@ impl TimedLeg {
         positions.iter().zip(rates).map(|(q, [d1, d2, d3])| [*q, d1, d2, d3]).collect()
     }
 }
+
+#[cfg(test)]
+mod tests;

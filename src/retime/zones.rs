@@ -110,4 +110,19 @@ mod tests {
             assert!((way + hold * own + 5e-3 - before).abs() < 1e-9, "{before}: {way}");
         }
     }
+
+    #[test]
+    fn rows_are_there_where_zones_are_and_allow_less_the_tighter_they_are_asked_for() {
+        let robot = fixtures::conv();
+        let all = [zone(1.0, 2.0, 0.2)];
+        for (zones, expected) in [(&all[..0], vec![]), (&all[..], vec![PLANNED / 2.0])] {
+            let zones = Zones::new(zones, &robot, 0.1);
+            assert_eq!(zones.is_empty(), expected.is_empty());
+            let (mut planned, mut limited) = (Vec::new(), Vec::new());
+            zones.planning(2.0, &mut planned);
+            zones.limit(&mut limited);
+            assert_eq!(planned.iter().map(|row| row[0]).collect::<Vec<_>>(), expected);
+            assert_eq!(limited.len(), expected.len());
+        }
+    }
 }

@@ -103,3 +103,6 @@ fn reference(curved: &Curved, task: Task<'_>) -> Clock {
     let profile = Convolution::fastest(metric.length(), [1.0, acceleration / speed, jerk / speed]);
     Clock::Metric(Arc::new(metric), profile)
 }
+
+#[cfg(test)]
+mod tests;

@@ -18,6 +18,8 @@ use super::{Problem, STILL};
 const POINTS: [(f64, f64); 3] = [(0.0, 1.0 / 6.0), (0.5, 4.0 / 6.0), (1.0, 1.0 / 6.0)];
 /// Steps at most.
 const STEPS: usize = 80;
+/// How often a step is made shorter at most.
+const SHORTER: usize = 16;
 /// No constraint shrinks by more in a step.
 const TO_BOUNDARY: f64 = 0.01;
 /// A multiplier stays within this factor of what the constraint's value asks for.
@@ -38,7 +40,7 @@ pub(super) fn solve(
 ) -> Option<Vec<[f64; 3]>> {
     let mut barrier = Barrier::new(problem, grid);
     let shape = match near {
-        Some(b) => (0..grid.cells() + 2).map(|i| b(grid.place(i))).collect(),
+        Some(b) => (0..grid.unknowns()).map(|i| b(grid.place(i))).collect(),
         None => guess(problem, grid),
     };
     let mut x = barrier.start(shape)?;
@@ -122,7 +124,7 @@ impl Barrier {
         }
         Self {
             caps: vec![Constraint::default(); points.len()],
-            signs: vec![Constraint::default(); grid.cells() + 2],
+            signs: vec![Constraint::default(); grid.unknowns()],
             on_acceleration: vec![Default::default(); acceleration.len()],
             on_jerk: vec![Default::default(); jerk.len()],
             points,
@@ -144,7 +146,7 @@ impl Barrier {
             let scale = START_INSIDE * self.largest_scale(&shape);
             let x: Vec<f64> = shape.iter().map(|x| x * scale).collect();
             let time = self.time(&x);
-            (time.is_finite() && scale > 0.0).then_some((time, x))
+            time.is_finite().then_some((time, x))
         });
         scaled.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, x)| x)
     }
@@ -178,12 +180,13 @@ impl Barrier {
     }
 
     /// Newton steps until the time is known to be within a share `gap` of the least (on the grid, as far as it is convex), or none helps.
-    fn descend(&mut self, x: &mut Vec<f64>, gap: f64) {
+    /// Returns how many.
+    fn descend(&mut self, x: &mut Vec<f64>, gap: f64) -> usize {
         let mut mu = 0.1 * self.time(x) / self.constraints() as f64;
         let mut step = vec![0.0; x.len()];
         let mut next = x.clone();
-        let Some(mut value) = self.assemble(x, mu, true, &mut step) else { return };
-        for _ in 0..STEPS {
+        let Some(mut value) = self.assemble(x, mu, true, &mut step) else { return 0 };
+        for taken in 0..STEPS {
             self.hessian.factor();
             self.hessian.solve(&mut step);
             let mut share = self.reach(x, &step, mu);
@@ -197,25 +200,26 @@ impl Barrier {
                 };
             let direction = step.clone();
             // Within reach all limits hold; the barrier function falls for a part of it at least.
-            let found = loop {
+            let falls = (0..SHORTER).find_map(|_| {
                 for i in 0..x.len() {
                     next[i] = x[i] + share * direction[i];
                 }
                 let found = self.assemble(&next, after, false, &mut step);
-                match found {
-                    Some(found) if found.merit(mu) <= value.merit(mu) * (1.0 + 1e-12) => break Some(found),
-                    _ if share < 1e-6 => break None,
-                    _ => share *= 0.4,
+                let found = found.filter(|found| found.is_no_worse(value, mu));
+                if found.is_none() {
+                    share *= 0.4;
                 }
-            };
-            let Some(found) = found else { return };
+                found
+            });
+            let Some(found) = falls else { return taken };
             std::mem::swap(x, &mut next);
             value = found;
             if share > 0.5 && self.constraints() as f64 * mu <= gap * value.time {
-                return;
+                return taken + 1;
             }
             mu = after;
         }
+        STEPS
     }
 
     /// Newton's system at some unknowns: fills the Hessian and the downhill gradient of the barrier function with weight `mu`, and the
@@ -224,7 +228,7 @@ impl Barrier {
         // Returns the multiplier over the slack: what the constraint adds to the Hessian.
         let keep = |constraint: &mut Constraint, inverse: f64| {
             let central = mu * inverse;
-            let on = if fresh { central } else { constraint.on.clamp(central / CENTRED, central * CENTRED) };
+            let on = if fresh { central } else { constraint.on.max(central / CENTRED).min(central * CENTRED) };
             *constraint = Constraint { inverse, on };
             on * inverse
         };
@@ -371,4 +375,12 @@ impl Value {
     fn merit(self, mu: f64) -> f64 {
         self.time - mu * self.logs
     }
+
+    /// But for rounding.
+    fn is_no_worse(self, than: Self, mu: f64) -> bool {
+        self.merit(mu) <= than.merit(mu) * (1.0 + 1e-12)
+    }
 }
+
+#[cfg(test)]
+mod tests;

@@ -115,7 +115,6 @@ impl Grid {
     fn halved(self, problem: &Problem<'_>, most: f64, rates: &mut impl FnMut(f64, &mut Vec<[f64; 3]>)) -> Self {
         let rows = problem.limits.len();
         let mut fine = Self { knots: Vec::new(), rates: Vec::new(), jumps: Vec::new(), slowness: Vec::new() };
-        fine.rates.reserve(3 * rows * self.cells());
         for (cell, jumps) in self.jumps.into_iter().enumerate() {
             let (from, slowness) = (self.knots[cell], self.slowness[cell]);
             fine.knots.push(from);
@@ -160,6 +159,11 @@ impl Grid {
         self.knots.len() - 1
     }
 
+    /// Number of unknowns: three have their say in each cell, two of them in the next one too.
+    pub fn unknowns(&self) -> usize {
+        self.cells() + 2
+    }
+
     /// Where an unknown has its say: the ends, and the middle of every cell.
     pub fn place(&self, unknown: usize) -> f64 {
         match unknown {
@@ -188,7 +192,7 @@ impl Grid {
 
 /// The stretches between breaks, with the jumps across them.
 fn stretches(problem: &Problem<'_>, rates: &mut impl FnMut(f64, &mut Vec<[f64; 3]>)) -> Option<Vec<Stretch>> {
-    let span = problem.breaks.last()? - problem.breaks.first()?;
+    let end = problem.breaks.last()?;
     let mut stretches: Vec<Stretch> = Vec::new();
     let mut found = Vec::new();
     let mut before: Vec<[f64; 3]> = Vec::new();
@@ -196,7 +200,7 @@ fn stretches(problem: &Problem<'_>, rates: &mut impl FnMut(f64, &mut Vec<[f64; 3
     let mut from = problem.breaks[0];
     for to in &problem.breaks[1..] {
         let length = to - from;
-        if length <= 1e-12 * span {
+        if length <= 1e-12 * end {
             continue;
         }
         let mut slowness = [0.0f64; SAMPLES];
@@ -258,3 +262,6 @@ fn graded(stretches: &[Stretch], density: f64) -> Vec<f64> {
     pass(&mut (0..count).rev());
     slowness
 }
+
+#[cfg(test)]
+mod tests;

@@ -146,6 +146,14 @@ mod tests {
     }
 
     #[test]
+    fn ratios_are_those_of_the_functions_far_from_zero_too() {
+        assert!((sine_ratio(-4.0) - real::sin(2.0) / 2.0).abs() < 1e-15);
+        assert!((sine_ratio(9.0) - real::sinh(3.0) / 3.0).abs() < 1e-14);
+        assert!((arc_ratio(-4.0) - real::atan(2.0) / 2.0).abs() < 1e-15);
+        assert!((arc_ratio(0.25) - real::atanh(0.5) / 0.5).abs() < 1e-15);
+    }
+
+    #[test]
     fn series_and_functions_agree_where_they_meet() {
         for x in [1.0f64, -1.0] {
             assert!((sine_ratio(x) - sine_ratio(x * (1.0 - 1e-16))).abs() < 1e-15);

@@ -126,3 +126,13 @@ fn what_does_not_move_or_is_not_finite_has_no_least_time() {
     assert_eq!(fastest(&problem, |_, out| out.push([0.0; 3])), None);
     assert_eq!(fastest(&problem, |_, out| out.push([f64::NAN; 3])), None);
 }
+
+#[test]
+fn least_times_of_nanoseconds_and_of_years_are_found_alike() {
+    let (time, _) = bend(3.0, 0.5, [0.5, 0.3, 0.5], false);
+    for unit in [1e-8, 1e8] {
+        let limits = [0.5 / unit, 0.3 / (unit * unit), 0.5 / (unit * unit * unit)];
+        let (scaled, _) = bend(3.0, 0.5, limits, false);
+        assert!((scaled / unit / time - 1.0).abs() < 1e-6, "{unit}: {time} s, {scaled} s");
+    }
+}

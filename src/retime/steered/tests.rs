@@ -269,3 +269,130 @@ fn near_its_rests_a_leg_of_the_distance_is_as_fast_as_its_places_say() {
         }
     }
 }
+
+/// Pieces of (seconds, rows of coefficients).
+fn of_pieces(pieces: &[(f64, Vec<Vec<f64>>)]) -> SteerLeg {
+    let pieces = pieces.iter().map(|(duration, rows)| Piece { duration: *duration, coefficients: rows.clone() });
+    SteerLeg { pose: Pose2::new(1.0, 2.0, 0.2), curve: PiecewisePoly { pieces: pieces.collect() } }
+}
+
+#[test]
+fn only_what_goes_one_way_in_proportion_all_the_time_is_proportional() {
+    let proportional = |rows: &[[f64; 4]]| {
+        let [Leg::Steer(leg)] = &steps(rows).legs[..] else { panic!("one leg") };
+        matches!(Course::steer(leg, 0.32).unwrap(), Course::Proportional(_))
+    };
+    // Of several pieces: a spin, a straight, the blade alone.
+    for row in [[1.0, 0.5, 0.0, 0.2], [2.0, 0.0, -0.6, 0.2], [3.0, 0.0, 0.0, 0.7]] {
+        assert!(proportional(&[row, row, row]) && proportional(&[row, [5.0, 0.0, 0.0, 0.0], row]), "{row:?}");
+        let back = [row[0], -0.1 * row[1], -0.1 * row[2], -0.1 * row[3]];
+        assert!(!proportional(&[row, back, row]), "{row:?}");
+    }
+    // The same blade in the end, but first the one and then the other.
+    assert!(!proportional(&[[1.0, 0.5, 0.0, 0.0], [1.0, 0.0, 0.0, 0.2]]));
+    assert!(!proportional(&[[1.0, 0.0, 0.5, 0.2], [1.0, 0.0, 0.5, 0.3]]));
+    // Nothing at all, and a way so short that going back by a hundredth of it cannot be told.
+    assert!(proportional(&[[1.0, 0.0, 0.0, 0.0]]));
+    assert!(proportional(&[[1.0, 1e-9, 0.0, 0.0], [1.0, -1e-11, 0.0, 0.0], [1.0, 1e-9, 0.0, 0.0]]));
+    // In one piece, away from its ends: the blade late, or the base a little too far and back.
+    let rows = |turn: Vec<f64>, blade: Vec<f64>| of_pieces(&[(2.0, vec![turn, vec![0.0], blade])]);
+    let bump = |size: f64| vec![0.2, 0.0, 4.0 * size, -4.0 * size, size];
+    for (leg, expected) in [
+        (rows(vec![0.2, 0.5], vec![0.1, 0.2]), true),
+        (rows(vec![0.2, 0.5], bump(1e-3)), false),
+        (rows(bump(1e-3), vec![0.1]), false),
+        (rows(vec![0.2, 0.5], bump(1e-12)), true),
+    ] {
+        assert_eq!(matches!(Course::steer(&leg, 0.32).unwrap(), Course::Proportional(_)), expected, "{leg:?}");
+    }
+}
+
+#[test]
+fn travel_begins_at_nothing_wherever_the_arc_length_does_and_every_joint_has_its_row() {
+    let rows = vec![vec![0.2, 0.1, 0.05], vec![5.0, 0.4, 0.02], vec![0.5, 0.3], vec![-0.5, 0.0, 0.7]];
+    let leg = of_pieces(&[(2.0, rows)]);
+    let Course::Steered(steered) = Course::steer(&leg, 0.32).unwrap() else { panic!("not in proportion") };
+    let curve = &steered.curve;
+    assert_eq!(steered.travel(curve.start()), [0.0; 2]);
+    let (turn, along) = (0.2 + 0.2, 0.8 + 0.08);
+    let travel = [along - 0.16 * turn, along + 0.16 * turn];
+    let mut positions = Vec::new();
+    steered.positions(curve.end(), &mut positions);
+    let expected = [travel[0], travel[1], 1.1, 2.3];
+    assert!(positions.len() == 4 && positions.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12));
+    let mut moved = Vec::new();
+    steered.moved(0.0, 2.0, &mut moved);
+    let expected = [travel[0], travel[1], 0.6, 2.8];
+    assert!(moved.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{moved:?}");
+    let mut rates = Vec::new();
+    steered.rates(curve.end(), [1.0, 0.0, 0.0], &mut rates);
+    let expected = [0.48 - 0.16 * 0.3, 0.48 + 0.16 * 0.3, 0.3, 2.8, 0.48];
+    assert!(rates.len() == 5 && rates.iter().zip(expected).all(|(a, b)| (a[0] - b).abs() < 1e-12), "{rates:?}");
+}
+
+#[test]
+fn forwards_backwards_slowly_or_from_rest_a_straight_line_is_one() {
+    for distance in [1.4, -1.4, 1e-4] {
+        // It bends, or it would be proportional; by 0.02 rad in all.
+        let steered = steered(&steps(&[[5.0, 0.02, distance, 0.0], [5.0, 0.02, distance, 0.0]]));
+        for at in [[1.0, 2.0, 3.0], [0.0, 0.5, 1.0], [2.4, 2.5, 2.6], [4.0, 4.5, 5.0]] {
+            assert!(!steered.turns_or_stands(at), "{distance} {at:?}");
+        }
+        assert!(steered.turns_or_stands([4.9, 5.0, 5.1]), "{distance}");
+    }
+    // A cusp that is not in the middle.
+    let cusp = steered(&steps(&[[5.0, 0.02, 1.4, 0.0], [5.0, 0.02, -1.4, 0.0]]));
+    for at in [[4.0, 4.5, 5.2], [4.8, 5.5, 6.0]] {
+        assert!(cusp.turns_or_stands(at), "{at:?}");
+    }
+}
+
+#[test]
+fn the_tightest_bend_is_found_where_it_is_short_and_near_a_rest_up_to_a_thousandth_of_the_time() {
+    // Straight, a bend of 0.3 s, straight; at 0.4 m/s all the time.
+    let line = |from: f64, seconds: f64, turn: Vec<f64>| (seconds, vec![turn, vec![from, 0.4], vec![0.1, 1e-3]]);
+    let leg = of_pieces(&[line(0.0, 4.0, vec![0.2]), line(1.6, 0.3, step(0.2, 0.3, 0.3)), line(1.72, 4.0, vec![0.5])]);
+    let Course::Steered(steered) = Course::steer(&leg, 0.32).unwrap() else { panic!("not in proportion") };
+    // The step is steepest in its middle: 35/16 of its mean.
+    let tightest = 35.0 / 16.0 * 0.3 / 0.3 / 0.4;
+    assert!((steered.largest_curvature() / tightest - 1.0).abs() < 1e-9, "{}", steered.largest_curvature());
+    // A heading that begins and ends to turn sooner than the base drives: the bend is tightest at the rests.
+    let steered = unending(0.1);
+    let x = 1e-3;
+    let tightest = 0.1 * 6.0 / (140.0 * 1.4 * x * x * (1.0 - x) * (1.0 - x));
+    assert!((steered.largest_curvature() / tightest - 1.0).abs() < 1e-6, "{} {tightest}", steered.largest_curvature());
+}
+
+/// 5 s in which the base drives 1.4 m, s' as the third power of time, and turns, phi' as the time itself.
+fn unending(turn: f64) -> Steered {
+    let heading = vec![0.2, 0.0, 3.0 * turn / 25.0, -2.0 * turn / 125.0];
+    let leg = of_pieces(&[(5.0, vec![heading, step(0.0, 1.4, 5.0), vec![0.1]])]);
+    match Course::steer(&leg, 0.32).unwrap() {
+        Course::Steered(steered) => steered,
+        _ => panic!("not in proportion"),
+    }
+}
+
+#[test]
+fn a_thousandth_of_the_speed_is_enough_for_laws_of_the_distance_and_less_is_refused() {
+    // Eq. 5 on an arc: what is left is v (1 - D/2 k).
+    let arc = |bend: f64| steps(&[[5.0, bend / 0.16 * 1.4, 1.4, 0.3]]);
+    for bend in [0.3, 1.0 - 2e-3] {
+        let profile = timed(&arc(bend), TimeLaw::Eq5).unwrap();
+        assert!((profile.v_max() - 0.5 * (1.0 - bend)).abs() < 1e-9, "{} {bend}", profile.v_max());
+        assert!((profile.v_comp() - 0.5 * bend).abs() < 1e-9);
+    }
+    for bend in [1.0 - 5e-4, 1.3] {
+        let refused = timed(&arc(bend), TimeLaw::Eq5).unwrap_err();
+        let RetimeError::CompensationLeavesNoSpeed { radius, left, .. } = refused else { panic!("{refused:?}") };
+        assert!((radius - 0.16 / bend).abs() < 1e-6 && (left - 0.5 * (1.0 - bend)).abs() < 1e-9, "{refused:?}");
+    }
+    // Its fixed point, v / (1 + D/2 k), is never zero, but as good as that where a bend is tight enough.
+    for (bend, expected) in [(499.0, Some(1e-3)), (1999.0, None)] {
+        match (timed(&arc(bend), TimeLaw::FixedPoint), expected) {
+            (Ok(profile), Some(speed)) => assert!((profile.v_max() - speed).abs() < 1e-9, "{}", profile.v_max()),
+            (Err(RetimeError::CompensationLeavesNoSpeed { left, .. }), None) => assert!((left - 2.5e-4).abs() < 1e-9),
+            (found, _) => panic!("{bend}: {found:?}"),
+        }
+    }
+}
