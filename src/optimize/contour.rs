@@ -7,10 +7,14 @@
 //! is 1-Lipschitz in x and y. What such a shape has drawn in over its rim, a table leg say, is far from all points of the rim again:
 //! balls inside the shape see it as deep as they are wide, and never ask for more than the rim does.
 
-use nalgebra::{Isometry3, Point3};
+mod surface;
+mod upright;
 
-use crate::math::real;
-use crate::robot::{Convex, RobotModel, Shape};
+use nalgebra::Point3;
+
+use crate::robot::{Convex, RobotModel};
+use surface::surface_points;
+use upright::Upright;
 
 /// Points in a leaf of the tree.
 const LEAF: usize = 4;
@@ -156,236 +160,6 @@ fn covered(robot: &RobotModel, own: usize, point: &ContourPoint) -> bool {
     })
 }
 
-/// Cosine of an angle that counts as upright.
-const UPRIGHT: f64 = 1.0 - 1e-9;
-
-/// A box or cylinder of the base that stands upright.
-struct Upright {
-    /// From its own axes to the map's, but for the base's pose.
-    pose: Isometry3<f64>,
-    /// From the base's body to the same.
-    origin: Isometry3<f64>,
-    plan: Plan,
-    half_height: f64,
-}
-
-/// What an upright shape looks like from above.
-enum Plan {
-    /// Along two of its axes.
-    Rectangle {
-        axes: [usize; 2],
-        half: [f64; 2],
-    },
-    Disc {
-        radius: f64,
-    },
-}
-
-impl Upright {
-    fn new(robot: &RobotModel, shape: &Shape) -> Option<Self> {
-        let origin = robot.bodies[0].origin;
-        let pose = origin * shape.pose;
-        let axis = |k: usize| pose.rotation.to_rotation_matrix()[(2, k)].abs();
-        let (plan, half_height) = match &shape.convex {
-            Convex::Box { half } => {
-                let up = (0..3).find(|k| axis(*k) > UPRIGHT)?;
-                let axes = [(up + 1) % 3, (up + 2) % 3];
-                (Plan::Rectangle { axes, half: axes.map(|a| half[a]) }, half[up])
-            }
-            Convex::Cylinder { radius, half_length } if axis(2) > UPRIGHT => {
-                (Plan::Disc { radius: *radius }, *half_length)
-            }
-            _ => return None,
-        };
-        Some(Self { pose, origin, plan, half_height })
-    }
-
-    /// Upright lines that cover it.
-    fn lines(&self, spacing: f64) -> Vec<ContourPoint> {
-        let feet: Vec<[f64; 3]> = match &self.plan {
-            Plan::Rectangle { axes, half } => {
-                rectangle_points(*half, spacing).into_iter().map(|at| on_axes(*axes, at)).collect()
-            }
-            Plan::Disc { radius } => disc_points(*radius, spacing),
-        };
-        let weight = 0.5 * (steps(2.0 * self.half_height, spacing) + 1) as f64;
-        feet.into_iter().map(|foot| self.line(foot, 0.0, weight)).collect()
-    }
-
-    /// Balls inside it, slid up and down as far as they stay inside, so close that none of its inside is further from them than they
-    /// reach; none where they would be smaller than what the rim sees.
-    fn inside(&self, spacing: f64) -> Vec<ContourPoint> {
-        let least = match &self.plan {
-            Plan::Rectangle { half, .. } => half[0].min(half[1]),
-            Plan::Disc { radius } => *radius,
-        };
-        let radius = self.half_height.min(0.5 * least);
-        if radius < spacing {
-            return Vec::new();
-        }
-        let apart = INSIDE * radius;
-        let feet: Vec<[f64; 3]> = match &self.plan {
-            Plan::Rectangle { axes, half } => {
-                let half = half.map(|h| h - radius);
-                let n = half.map(|h| steps(2.0 * h, apart));
-                let place = |index: [usize; 2]| [0, 1].map(|a| half[a] * (2.0 * index[a] as f64 / n[a] as f64 - 1.0));
-                let all = (0..=n[0]).flat_map(|i| (0..=n[1]).map(move |j| [i, j]));
-                all.map(|index| on_axes(*axes, place(index))).collect()
-            }
-            Plan::Disc { radius: whole } => disc_points(whole - radius, 0.5 * apart),
-        };
-        // As many points as the lines that they stand beside.
-        let weight = 0.5 * (steps(2.0 * self.half_height, spacing) + 1) as f64;
-        feet.into_iter().map(|foot| self.line(foot, radius, weight)).collect()
-    }
-
-    /// A line from bottom to top, but for a radius at both ends.
-    fn line(&self, foot: [f64; 3], radius: f64, weight: f64) -> ContourPoint {
-        let half = (self.half_height - radius).max(0.0);
-        let at = self.pose * Point3::from(foot) - nalgebra::Vector3::z() * half;
-        ContourPoint { at: self.origin.inverse_transform_point(&at), radius, rise: 2.0 * half, weight }
-    }
-}
-
-/// Balls inside a shape are so many of their radii apart: a square of them leaves no hole.
-const INSIDE: f64 = 1.4;
-
-fn on_axes(axes: [usize; 2], at: [f64; 2]) -> [f64; 3] {
-    let mut place = [0.0; 3];
-    (place[axes[0]], place[axes[1]]) = (at[0], at[1]);
-    place
-}
-
-fn surface_points(convex: &Convex, pose: &Isometry3<f64>, spacing: f64) -> Vec<ContourPoint> {
-    let local = match convex {
-        Convex::Sphere { radius } => {
-            return vec![ContourPoint { radius: *radius, ..ContourPoint::plain(pose * Point3::origin()) }];
-        }
-        Convex::Box { half } => box_points(half, spacing),
-        Convex::Cylinder { radius, half_length } => cylinder_points(*radius, *half_length, spacing),
-        Convex::Hull { vertices } => hull_points(convex, vertices, spacing),
-    };
-    local.into_iter().map(|p| ContourPoint::plain(pose * Point3::from(p))).collect()
-}
-
-/// Number of equal steps no longer than `spacing` along `length`, at least one.
-fn steps(length: f64, spacing: f64) -> usize {
-    (length / spacing - 1e-9).ceil().max(1.0) as usize
-}
-
-/// The rim at `spacing`, the inside at twice that.
-fn rectangle_points(half: [f64; 2], spacing: f64) -> Vec<[f64; 2]> {
-    let n = half.map(|h| steps(2.0 * h, spacing));
-    let mut points = Vec::new();
-    for i in 0..=n[0] {
-        for j in 0..=n[1] {
-            let index = [i, j];
-            let rim = (0..2).any(|a| index[a] == 0 || index[a] == n[a]);
-            if rim || index.iter().all(|i| i.is_multiple_of(2)) {
-                points.push([0, 1].map(|a| half[a] * (2.0 * index[a] as f64 / n[a] as f64 - 1.0)));
-            }
-        }
-    }
-    points
-}
-
-/// The same of a disc about the origin.
-fn disc_points(radius: f64, spacing: f64) -> Vec<[f64; 3]> {
-    let rings = steps(radius, 2.0 * spacing);
-    let mut points = vec![[0.0; 3]];
-    for r in 1..=rings {
-        let (radius, spacing) = (radius * r as f64 / rings as f64, if r == rings { spacing } else { 2.0 * spacing });
-        points.extend(ring_points(radius, 0.0, spacing));
-    }
-    points
-}
-
-fn ring_points(radius: f64, z: f64, spacing: f64) -> impl Iterator<Item = [f64; 3]> {
-    let n = steps(std::f64::consts::TAU * radius, spacing).max(8);
-    (0..n).map(move |i| {
-        let (s, c) = real::sin_cos(std::f64::consts::TAU * i as f64 / n as f64);
-        [radius * c, radius * s, z]
-    })
-}
-
-fn box_points(half: &[f64; 3], spacing: f64) -> Vec<[f64; 3]> {
-    let n = half.map(|h| steps(2.0 * h, spacing));
-    let mut points = Vec::new();
-    for i in 0..=n[0] {
-        for j in 0..=n[1] {
-            for k in 0..=n[2] {
-                let index = [i, j, k];
-                let extremes = (0..3).filter(|&a| index[a] == 0 || index[a] == n[a]).count();
-                let coarse = (0..3).all(|a| index[a].is_multiple_of(2) || index[a] == n[a]);
-                if extremes >= 2 || (extremes == 1 && coarse) {
-                    points.push(std::array::from_fn(|a| half[a] * (2.0 * index[a] as f64 / n[a] as f64 - 1.0)));
-                }
-            }
-        }
-    }
-    points
-}
-
-fn cylinder_points(radius: f64, half_length: f64, spacing: f64) -> Vec<[f64; 3]> {
-    let mut points = Vec::new();
-    let mut ring = |radius: f64, z: f64, spacing: f64| points.extend(ring_points(radius, z, spacing));
-    // The mantle's rings are as dense along the axis as around it: a cylinder has no edge there to be hit first.
-    let levels = steps(2.0 * half_length, spacing);
-    for level in 0..=levels {
-        ring(radius, half_length * (2.0 * level as f64 / levels as f64 - 1.0), spacing);
-    }
-    let rings = steps(radius, 2.0 * spacing);
-    for r in 1..rings {
-        for z in [-half_length, half_length] {
-            ring(radius * r as f64 / rings as f64, z, 2.0 * spacing);
-        }
-    }
-    points.extend([[0.0, 0.0, -half_length], [0.0, 0.0, half_length]]);
-    points
-}
-
-/// Directions spread evenly over the sphere.
-fn directions(count: usize) -> impl Iterator<Item = nalgebra::Vector3<f64>> {
-    let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
-    (0..count).map(move |i| {
-        let z = 1.0 - (2 * i + 1) as f64 / count as f64;
-        let flat = (1.0 - z * z).sqrt();
-        let (s, c) = real::sin_cos(golden * i as f64);
-        nalgebra::Vector3::new(flat * c, flat * s, z)
-    })
-}
-
-/// Vertices, and points between pairs of them that lie near the surface, thinned to one a cell of half the spacing.
-fn hull_points(convex: &Convex, vertices: &[[f64; 3]], spacing: f64) -> Vec<[f64; 3]> {
-    let supports: Vec<_> = directions(256).map(|d| (d, convex.support(&d).dot(&d))).collect();
-    let depth = |p: &[f64; 3]| {
-        supports.iter().map(|(d, h)| h - d.x * p[0] - d.y * p[1] - d.z * p[2]).fold(f64::INFINITY, f64::min)
-    };
-    let mut points = vertices.to_vec();
-    let mut taken = std::collections::BTreeSet::new();
-    let cell = |p: &[f64; 3]| p.map(|v| (v / (0.5 * spacing)).round() as i64);
-    taken.extend(vertices.iter().map(&cell));
-    // Enough to bridge every edge of a plain hull; a finely meshed one has its vertices for that.
-    let nearest = if vertices.len() <= 24 { vertices.len() } else { 12 };
-    for (i, a) in vertices.iter().enumerate() {
-        let apart = |b: &[f64; 3]| (0..3).map(|k| real::powi(a[k] - b[k], 2)).sum::<f64>();
-        let mut others: Vec<_> = vertices.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, b)| b).collect();
-        others.sort_by(|b, c| apart(b).total_cmp(&apart(c)));
-        for b in others.into_iter().take(nearest) {
-            let n = steps(apart(b).sqrt(), spacing);
-            for k in 1..n {
-                let f = k as f64 / n as f64;
-                let p: [f64; 3] = std::array::from_fn(|d| a[d] + f * (b[d] - a[d]));
-                if !taken.contains(&cell(&p)) && depth(&p) < 0.5 * spacing {
-                    taken.insert(cell(&p));
-                    points.push(p);
-                }
-            }
-        }
-    }
-    points
-}
-
 /// Builds the tree over `points`, which it reorders; `offset` is where they will lie among all points.
 fn split(points: &mut [ContourPoint], offset: usize, patches: &mut Vec<Patch>) {
     let (mut low, mut high) = (Point3::from([f64::INFINITY; 3]), Point3::from([f64::NEG_INFINITY; 3]));
@@ -411,7 +185,11 @@ fn split(points: &mut [ContourPoint], offset: usize, patches: &mut Vec<Patch>) {
 
 #[cfg(test)]
 mod tests {
+    use super::surface::{box_points, cylinder_points, directions, hull_points};
     use super::*;
+    use crate::math::real;
+    use crate::robot::Shape;
+    use nalgebra::Isometry3;
 
     fn nearest(points: &[[f64; 3]], p: [f64; 3]) -> f64 {
         points

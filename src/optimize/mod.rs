@@ -30,7 +30,7 @@ use crate::trajectory::{Ending, Leg, OptimiserOutcome, Trajectory, TrajectorySou
 
 use leg::{Context, SolvedLeg, solve};
 pub use options::OptimizeOptions;
-pub use penalty::clearance::DistanceField;
+pub use penalty::field::DistanceField;
 use sections::{DriveSection, Section, Thresholds, sections, still};
 
 /// Smooths a path. Legs begin and end exactly at the path's states; headings keep the path's branch, so the last one is the

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 
-use super::penalty::clearance::DistanceField;
+use super::penalty::field::DistanceField;
 use crate::math::real;
 use crate::robot::{
     BaseLimits, Body, BodyMotion, Convex, IgnoreReason, IgnoredPair, MotionLimits, MovingJoint, RobotModel, Shape,

@@ -6,58 +6,16 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use super::Judge;
+use super::field::{DistanceField, look_up};
 use super::own_links::{self, Meeting, OwnLinks};
-use crate::esdf::least_of_points;
+use super::touch::{BodyFrame, ByPose, PointOf, Pushed, Touch, met};
 use crate::math::real;
 use crate::optimize::contour::{Contour, Reach};
 use crate::robot::RobotModel;
 
-/// A signed distance to obstacles, m.
-pub trait DistanceField {
-    /// Distance at a point in the map frame.
-    fn distance(&self, p: [f64; 3]) -> f64;
-    /// Distance and its gradient.
-    fn distance_gradient(&self, p: [f64; 3]) -> (f64, [f64; 3]);
-    /// Size of a cell that values are interpolated over, m; 0 for an exact field.
-    fn cell(&self) -> f64;
-    /// Least distance on an upright line of `rise` m from `foot` up, and its gradient by x and y (its third part is 0). Here: at
-    /// places a cell apart, both ends among them.
-    fn least_above(&self, foot: [f64; 3], rise: f64) -> (f64, [f64; 3]) {
-        let steps = if self.cell() > 0.0 { (rise / self.cell()).ceil().max(1.0) } else { 16.0 };
-        least_of_points(foot, rise, steps as usize, |p| self.distance_gradient(p))
-    }
-}
-
-impl DistanceField for crate::esdf::Esdf {
-    fn distance(&self, p: [f64; 3]) -> f64 {
-        self.distance(p)
-    }
-    fn distance_gradient(&self, p: [f64; 3]) -> (f64, [f64; 3]) {
-        self.distance_gradient(p)
-    }
-    fn cell(&self) -> f64 {
-        self.resolution
-    }
-    fn least_above(&self, foot: [f64; 3], rise: f64) -> (f64, [f64; 3]) {
-        self.least_above(foot, rise)
-    }
-}
-
-/// Distance and gradient at a contour point that is at `at` in the map.
-fn look_up(field: &impl DistanceField, at: Vector3<f64>, rise: f64) -> (f64, [f64; 3]) {
-    if rise > 0.0 { field.least_above(at.into(), rise) } else { field.distance_gradient(at.into()) }
-}
-
 /// Interpolated values lie at most 0.26 cells above and sqrt(3)/2 cells below the true distance (MATH section 4), so a ball's
 /// centre bounds its points up to the sum.
 const INTERPOLATION_SLACK: f64 = 1.13;
-
-#[derive(Debug, Clone, Copy)]
-pub(super) struct BodyFrame {
-    pub rotation: Matrix3<f64>,
-    /// Relative to the base's origin, map axes.
-    pub origin: Vector3<f64>,
-}
 
 /// What pushes on a body.
 #[derive(Debug, Clone, Copy)]
@@ -110,94 +68,6 @@ pub struct ClearancePenalty {
     loads: Vec<Load>,
     /// Scratch of [`ClearancePenalty::visit`]: one entry a joint.
     by_joints: Vec<f64>,
-}
-
-/// Derivatives of the clearance penalty by the pose of the base.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct ByPose {
-    /// By x and y.
-    pub position: [f64; 2],
-    /// By the heading.
-    pub heading: f64,
-}
-
-/// What is near something.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum PointOf {
-    /// A contour point, near an obstacle, and the body that it is on.
-    Contour { body: usize, point: usize },
-    /// A pair of the robot's own links.
-    Pair(usize),
-}
-
-/// A contour point near an obstacle, or two links near each other.
-pub(crate) struct Touch<'a> {
-    pub of: PointOf,
-    /// By how much it misses the wanted clearance, m.
-    pub short: f64,
-    /// How many points it stands for.
-    pub weight: f64,
-    /// Derivatives of `short` by the pose, and by the joints.
-    pub by_pose: ByPose,
-    pub by_joints: &'a [f64],
-}
-
-/// Adds what the joints below a body do to a push on a point of it.
-fn feel(
-    robot: &RobotModel,
-    frames: &[BodyFrame],
-    mut link: usize,
-    arm: Vector3<f64>,
-    push: Vector3<f64>,
-    by_joints: &mut [f64],
-) {
-    while link != 0 {
-        let (frame, body) = (&frames[link], &robot.bodies[link]);
-        if let Some(motion) = &body.motion {
-            let axis = frame.rotation * motion.axis.into_inner();
-            let felt = if motion.prismatic { axis.dot(&push) } else { axis.dot(&(arm - frame.origin).cross(&push)) };
-            by_joints[motion.joint] += motion.multiplier * felt;
-        }
-        link = body.parent;
-    }
-}
-
-/// A point whose missing clearance grows along `push`.
-struct Pushed {
-    of: PointOf,
-    body: usize,
-    /// From the base's origin, map axes, m.
-    arm: Vector3<f64>,
-    short: f64,
-    weight: f64,
-    push: Vector3<f64>,
-}
-
-impl Pushed {
-    fn touch<'a>(self, robot: &RobotModel, frames: &[BodyFrame], by_joints: &'a mut [f64]) -> Touch<'a> {
-        let Self { of, body, arm, short, weight, push } = self;
-        by_joints.fill(0.0);
-        feel(robot, frames, body, arm, push, by_joints);
-        let by_pose = ByPose { position: [push.x, push.y], heading: arm.x * push.y - arm.y * push.x };
-        Touch { of, short, weight, by_pose, by_joints }
-    }
-}
-
-/// A pair of own links; the base moves both alike.
-fn met<'a>(
-    robot: &RobotModel,
-    frames: &[BodyFrame],
-    pair: usize,
-    meeting: &Meeting,
-    by_joints: &'a mut [f64],
-) -> Touch<'a> {
-    by_joints.fill(0.0);
-    let pushes = [-meeting.normal, meeting.normal];
-    for ((body, arm), push) in meeting.bodies.into_iter().zip(meeting.arms).zip(pushes) {
-        feel(robot, frames, body, arm, push, by_joints);
-    }
-    let (short, weight) = (own_links::MARGIN - meeting.distance, own_links::WEIGHT);
-    Touch { of: PointOf::Pair(pair), short, weight, by_pose: ByPose::default(), by_joints }
 }
 
 impl ClearancePenalty {

@@ -2,9 +2,11 @@
 //! limit (squared forms by the limit squared) before [`smooth_positive`], so one width and one weight suit all.
 
 pub mod clearance;
+pub mod field;
 pub mod joint;
 mod own_links;
 pub mod speed;
+pub(crate) mod touch;
 pub mod turn;
 pub mod zone;
 

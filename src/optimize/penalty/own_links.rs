@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 
-use super::clearance::BodyFrame;
+use super::touch::BodyFrame;
 use crate::math::gjk;
 use crate::optimize::contour::Reach;
 use crate::robot::{Convex, RobotModel, Shape};
@@ -182,7 +182,8 @@ impl Pair {
 
 #[cfg(test)]
 mod tests {
-    use super::super::clearance::{ByPose, ClearancePenalty, Placement, PointOf};
+    use super::super::clearance::{ClearancePenalty, Placement};
+    use super::super::touch::{ByPose, PointOf};
     use super::super::{Limits, Penalise};
     use super::*;
     use crate::optimize::contour::Contour;

@@ -12,26 +12,17 @@ pub(super) struct Local {
     pub gradient: Vec<f64>,
     /// Lower triangle, row by row.
     pub hessian: Vec<f64>,
-    /// What the gaps add to the Hessian's diagonal.
-    pub stiff: Vec<f64>,
 }
 
 impl Local {
     pub fn new(layout: Layout) -> Self {
         let size = layout.local_size();
-        Self {
-            size,
-            time: layout.local_time(),
-            gradient: vec![0.0; size],
-            hessian: vec![0.0; size * size],
-            stiff: vec![0.0; size],
-        }
+        Self { size, time: layout.local_time(), gradient: vec![0.0; size], hessian: vec![0.0; size * size] }
     }
 
     pub fn clear(&mut self) {
         self.gradient.fill(0.0);
         self.hessian.fill(0.0);
-        self.stiff.fill(0.0);
     }
 
     /// Adds a term by the logarithm of the duration alone.
@@ -128,7 +119,5 @@ impl Local {
             let row = &mut self.hessian[below * size..below * size + time + 1];
             row[time] += stretch.iter().zip(row.iter()).map(|(s, h)| s * h).sum::<f64>();
         }
-        let extra: f64 = stretch.iter().zip(&self.stiff).map(|(s, d)| s * s * d).sum();
-        self.stiff[time] += extra;
     }
 }

@@ -16,7 +16,8 @@ mod swing;
 use super::OptimizeOptions;
 use super::contour::Contour;
 use super::penalty::Limits;
-use super::penalty::clearance::{ClearancePenalty, DistanceField};
+use super::penalty::clearance::ClearancePenalty;
+use super::penalty::field::DistanceField;
 use super::penalty::zone::ZonePenalty;
 use super::sections::still;
 use crate::math::poly::{Piece, PiecewisePoly};
@@ -35,13 +36,13 @@ use swing::Swing;
 /// How to optimise heading and arc length.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SteerOptions {
-    /// Weight of the jerk (squared, relative to the wheels' and joints' jerk limits) against time; larger is smoother. Default 10: little,
+    /// Weight of the jerk (squared, relative to the wheels' and joints' jerk limits) against time; larger is smoother. Default 7: little,
     /// since the way that takes the least time is sought.
     pub smoothness: f64,
     /// The same in the optimiser's own timing of the way that it has found: all durations are stretched alike, until time and
     /// jerk are least. Default 200: a mean jerk as small as \[SCR\]'s at its limits. A time law sets the pace anew.
     pub own_smoothness: f64,
-    /// Weight of a limit overstepped by 100 % for 1 s, s. Default 30.
+    /// Weight of a limit overstepped by 100 % for 1 s, s. Default 15.
     pub motion_weight: f64,
     /// Weight of one contour point that misses the clearance by [`OptimizeOptions::clearance_scale`] for 1 s, s. Default 200.
     pub clearance_weight: f64,
@@ -59,9 +60,9 @@ pub struct SteerOptions {
 impl Default for SteerOptions {
     fn default() -> Self {
         Self {
-            smoothness: 10.0,
+            smoothness: 7.0,
             own_smoothness: 200.0,
-            motion_weight: 30.0,
+            motion_weight: 15.0,
             clearance_weight: 200.0,
             sample_distance: 0.15,
             sample_time: 0.2,

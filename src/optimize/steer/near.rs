@@ -8,7 +8,9 @@ use super::layout::{ARC, HEADING, Layout};
 use super::problem::Problem;
 use super::rows::{Contact, Missed, Row, Rows};
 use crate::math::banded::Banded;
-use crate::optimize::penalty::clearance::{DistanceField, Placement, Touch};
+use crate::optimize::penalty::clearance::Placement;
+use crate::optimize::penalty::field::DistanceField;
+use crate::optimize::penalty::touch::Touch;
 
 impl<F: DistanceField> Problem<'_, F> {
     /// What the contour misses of the clearance at a sample (piece, its sample, sample of all); joints are set.

@@ -18,7 +18,8 @@ use super::rows::Contacts;
 use crate::math::banded::Banded;
 use crate::math::real;
 use crate::optimize::penalty::Limits;
-use crate::optimize::penalty::clearance::{ClearancePenalty, DistanceField};
+use crate::optimize::penalty::clearance::ClearancePenalty;
+use crate::optimize::penalty::field::DistanceField;
 use crate::optimize::penalty::zone::ZonePenalty;
 use crate::robot::RobotModel;
 
@@ -105,8 +106,6 @@ pub(super) struct Problem<'a, F> {
 pub(super) struct Derivatives {
     pub gradient: Vec<f64>,
     pub hessian: Banded,
-    /// What the gaps add to the Hessian's diagonal.
-    pub stiff: Vec<f64>,
     /// Gaps between pieces, m.
     pub gaps: Vec<[f64; 2]>,
     /// Their derivatives by the unknowns of their pieces, `[(piece * 2 + axis) * local size + local]`.
@@ -118,7 +117,6 @@ impl Derivatives {
         Self {
             gradient: vec![0.0; layout.size()],
             hessian: Banded::new(layout.size(), layout.width()),
-            stiff: vec![0.0; layout.size()],
             gaps: vec![[0.0; 2]; layout.pieces],
             by_gaps: vec![0.0; layout.pieces * 2 * layout.local_size()],
         }
@@ -233,7 +231,6 @@ impl<'a, F: DistanceField> Problem<'a, F> {
     /// Cost at `x` without the gaps, which have these multipliers; fills `out`.
     pub fn evaluate(&mut self, x: &[f64], multipliers: &[[f64; 2]], out: &mut Derivatives) -> f64 {
         out.gradient.fill(0.0);
-        out.stiff.fill(0.0);
         out.hessian.clear();
         self.contacts.clear();
         let mut cost = 0.0;
@@ -315,9 +312,6 @@ impl<'a, F: DistanceField> Problem<'a, F> {
         for (axis, jacobian) in by_gap.chunks_exact_mut(self.local.size).enumerate() {
             gap_jacobian(layout, &path, axis, jacobian);
             self.local.add(jacobian, multiplier[axis] + STIFFNESS * gap[axis], STIFFNESS);
-            for (stiff, by) in self.local.stiff.iter_mut().zip(jacobian.iter()) {
-                *stiff += STIFFNESS * *by * *by;
-            }
             self.by_unknowns(piece, time, jacobian);
         }
         (cost, gap)
@@ -372,7 +366,6 @@ impl<'a, F: DistanceField> Problem<'a, F> {
             }
             let scale = power(i, self.local.time, time);
             out.gradient[row] += scale * self.local.gradient[i];
-            out.stiff[row] += scale * scale * self.local.stiff[i];
             for j in 0..=i {
                 let column = base + self.offsets[j];
                 if !self.fixed[column] {

@@ -1,7 +1,7 @@
 //! What a sample misses, and what a step would do to it: limits and contour points linearised, each active or not as the step says.
 
 use super::layout::Layout;
-use crate::optimize::penalty::clearance::PointOf;
+use crate::optimize::penalty::touch::PointOf;
 
 /// Contour points of a sample that are remembered: the deepest.
 const DEEPEST: usize = 3;

@@ -12,7 +12,7 @@
 use super::problem::{Derivatives, Problem, STIFFNESS};
 use super::rows::{self, Contact, Rows};
 use crate::math::banded::Banded;
-use crate::optimize::penalty::clearance::DistanceField;
+use crate::optimize::penalty::field::DistanceField;
 
 /// How to iterate.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,18 +35,15 @@ pub(super) struct Solved {
 /// Price of a squared gap in the merit, s/m^2.
 const GAP_PRICE: f64 = 200.0;
 /// Damping at first; it follows how well the model predicts.
-const FIRST_DAMPING: f64 = 0.3;
-/// Share of the costs' own curvature in the damping.
-const DIAGONAL_SHARE: f64 = 0.01;
+const FIRST_DAMPING: f64 = 4.0;
 /// The iteration ends where a step lowers the merit little and leaves gaps below this, m.
 const SMALL_GAP: f64 = 1e-4;
 
 /// How often a step is made before it is damped more.
 const ATTEMPTS: usize = 2;
-/// Damping after a step that was as good as the model says, one that was much worse, any other; and after one that was refused.
+/// Damping after a step that was as good as the model says, one that was much worse, and one that was refused.
 const TRUSTED: f64 = 0.5;
 const DOUBTED: f64 = 3.0;
-const USUAL: f64 = 0.6;
 const REFUSED: f64 = 5.0;
 /// Rounds in which a step finds out which limits it exceeds; from which round on it lets go of none.
 const ROUNDS: usize = 8;
@@ -119,7 +116,7 @@ pub(super) fn solve<F: DistanceField>(
                 damping *= match ratio {
                     r if r > 0.75 => TRUSTED,
                     r if r < 0.25 => DOUBTED,
-                    _ => USUAL,
+                    _ => 1.0,
                 };
                 damping = damping.max(1e-9);
                 x.copy_from_slice(&work.trial);
@@ -227,8 +224,7 @@ impl Workspace {
             self.factor.copy_from(&self.here.hessian);
             self.gradient.copy_from_slice(&self.here.gradient);
             for (i, natural) in self.natural.iter().enumerate() {
-                let diagonal = (self.here.hessian.diagonal(i) - self.here.stiff[i]).max(0.0);
-                *self.factor.entry(i, i) += damping * (natural + DIAGONAL_SHARE * diagonal);
+                *self.factor.entry(i, i) += damping * natural;
             }
             for (k, row) in self.rows.rows.iter().enumerate().filter(|(k, _)| self.taken[*k]) {
                 problem.add_row(*row, self.rows.by(k), &mut self.gradient, &mut self.factor);

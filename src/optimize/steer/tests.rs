@@ -6,7 +6,7 @@ use crate::geom::Pose2;
 use crate::math::fd::{numeric_gradient, relative_error};
 use crate::math::real;
 use crate::mission::SpeedZone;
-use crate::optimize::penalty::clearance::PointOf;
+use crate::optimize::penalty::touch::PointOf;
 use crate::optimize::test_robot::{Boxes, arm, robot};
 use crate::optimize::tests::{Broken, gap, path};
 use crate::trajectory::steered_curve::SteeredCurve;
