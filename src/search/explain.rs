@@ -75,7 +75,7 @@ pub(super) fn not_found<const W: usize>(solver: &Solver<'_, W>) -> SearchError {
     let problem = Problem { robot: &base, query: &query, ..solver.problem };
     let sampled = SearchError::Sampled { postures: solver.collider.postures.count() };
     let Ok(alone) = Solver::<1>::new(problem, Postures::new(&base, &query, 0)) else { return sampled };
-    match alone.guided().map_or_else(|| alone.on_the_lattice(MOST_LABELS_ALONE), Ok) {
+    match alone.guided().map_or_else(|| alone.on_the_lattice(MOST_LABELS_ALONE), |guided| Ok(guided.path)) {
         Err(NoPath::Exhausted { core_clearances, closest, expanded }) => {
             absent(&alone, &core_clearances, closest, expanded)
         }
@@ -222,7 +222,7 @@ fn way_with_less<const W: usize>(solver: &Solver<'_, W>, less: f64) -> Option<Se
     let robot = thinner(problem.robot, less - problem.options.clearance);
     let problem = Problem { robot: &robot, options: &options, ..problem };
     let solver = Solver::<W>::new(problem, solver.collider.postures.clone()).ok()?;
-    solver.guided().or_else(|| solver.on_the_lattice(QUICK).ok())
+    solver.guided().map(|guided| guided.path).or_else(|| solver.on_the_lattice(QUICK).ok())
 }
 
 /// The robot with every shape's surface so much farther in, m; for hulls about so much.

@@ -27,6 +27,7 @@ mod roadmap;
 mod route;
 mod shortcut;
 mod solve;
+mod upright;
 
 use crate::esdf::Esdf;
 use crate::geom::Pose2;
@@ -37,7 +38,8 @@ use crate::robot::RobotModel;
 pub use collide::Contact;
 pub use error::{Absence, Blocked, SearchError, Tightest};
 use posture::Postures;
-use solve::{NoPath, Problem, Solver};
+pub use solve::seconds;
+use solve::{Guided, NoPath, Problem, Solver};
 
 /// A path on the lattice, joined to the exact start and goal. Between consecutive states the motion is linear in joint
 /// space: a spin or a straight drive, joints in proportion.
@@ -130,12 +132,20 @@ pub fn search(
     {
         return Ok(path);
     }
-    for level in 1..Postures::levels(robot) {
-        if let Some(path) = quick::<{ posture::FEW_POSTURES / 64 }>(problem, Postures::new(robot, query, level - 1)) {
-            return Ok(path);
+    let levels = Postures::levels(robot);
+    for level in 1..levels {
+        match quick::<{ posture::FEW_POSTURES / 64 }>(problem, Postures::new(robot, query, level - 1)) {
+            Some(Guided { path, sure: true }) => return Ok(path),
+            Some(Guided { path, sure: false }) => {
+                // With more postures it may get through where it was blocked.
+                let more = quick::<{ posture::MOST_POSTURES / 64 }>(problem, Postures::new(robot, query, levels - 1));
+                let quicker = more.map(|more| more.path).filter(|more| seconds(robot, more) < seconds(robot, &path));
+                return Ok(quicker.unwrap_or(path));
+            }
+            None => {}
         }
     }
-    let postures = Postures::new(robot, query, Postures::levels(robot) - 1);
+    let postures = Postures::new(robot, query, levels - 1);
     if postures.count() <= 64 {
         solve::<1>(problem, postures)
     } else {
@@ -159,7 +169,23 @@ pub fn with_more_postures(
     if query.goal_within > 0.0 {
         return region::path(problem, levels - 1..levels);
     }
-    quick::<{ posture::MOST_POSTURES / 64 }>(problem, postures)
+    quick::<{ posture::MOST_POSTURES / 64 }>(problem, postures).map(|guided| guided.path)
+}
+
+/// Another path than [`search`] finds, for a robot with many joints, that keeps out of gaps hardly wider than the robot; `None`: none was
+/// found soon.
+pub fn with_more_room(
+    map: &VoxelMap,
+    esdf: &Esdf,
+    robot: &RobotModel,
+    query: &Query,
+    options: &SearchOptions,
+) -> Option<SearchPath> {
+    if query.goal_within > 0.0 || !has_more_postures(robot) {
+        return None;
+    }
+    let problem = Problem { map, esdf, robot, query, options };
+    Solver::<{ posture::FEW_POSTURES / 64 }>::new(problem, Postures::new(robot, query, 0)).ok()?.wide()
 }
 
 /// Whether [`with_more_postures`] knows more of a robot than [`search`] looks at first.
@@ -168,7 +194,7 @@ pub fn has_more_postures(robot: &RobotModel) -> bool {
 }
 
 /// A path with these postures, where one is found soon.
-fn quick<const W: usize>(problem: Problem<'_>, postures: Postures) -> Option<SearchPath> {
+fn quick<const W: usize>(problem: Problem<'_>, postures: Postures) -> Option<Guided> {
     Solver::<W>::new(problem, postures).ok()?.guided()
 }
 
@@ -181,8 +207,8 @@ fn solve<const W: usize>(problem: Problem<'_>, postures: Postures) -> Result<Sea
         Err(end) => return Err(explain::blocked::<W>(&problem, postures, end)),
     };
     loop {
-        if let Some(path) = solver.guided() {
-            return Ok(path);
+        if let Some(guided) = solver.guided() {
+            return Ok(guided.path);
         }
         let exhaustive = solver.collider.postures.is_exhaustive();
         let labels = if exhaustive { astar::MOST_LABELS } else { MOST_LABELS_OF_A_ROADMAP };

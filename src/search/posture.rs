@@ -83,7 +83,7 @@ impl Postures {
     }
 
     /// All combinations of the joints' values.
-    fn over(samples: Vec<Vec<f64>>) -> Self {
+    pub fn over(samples: Vec<Vec<f64>>) -> Self {
         let mut count = 1;
         let mut axes = Vec::new();
         for own in &samples {

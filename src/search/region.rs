@@ -93,8 +93,8 @@ pub(super) fn path(problem: Problem<'_>, levels: Range<usize>) -> Option<SearchP
             } else {
                 quick::<{ posture::MOST_POSTURES / 64 }>(problem, postures)
             };
-            if let Some(path) = found {
-                return Some(cut(path, query));
+            if let Some(guided) = found {
+                return Some(cut(guided.path, query));
             }
         }
     }

@@ -4,7 +4,7 @@ use super::astar::{self, AStar, Outcome};
 use super::bits::Bits;
 use super::collide::{BaseMotion, Collider, Mast, TOO_LOW};
 use super::escape::Escape;
-use super::guide::{self, Guide};
+use super::guide::{self, Fits, Guide};
 use super::headed::{self, Headed};
 use super::heuristic::{self, Core, CostToGo};
 use super::joints;
@@ -12,6 +12,7 @@ use super::lattice::{self, Lattice};
 use super::posture::Postures;
 use super::route::{Grain, Route};
 use super::shortcut::{CheckedRoute, Shortcutter};
+use super::upright::Upright;
 use super::{Query, SearchMove, SearchOptions, SearchPath, SearchState, region};
 use crate::esdf::Esdf;
 use crate::geom::{Pose2, wrap_angle};
@@ -46,6 +47,20 @@ pub(super) struct Problem<'a> {
 pub(super) enum End {
     Start,
     Goal,
+}
+
+/// A path that was found without searching the lattice.
+pub(super) struct Guided {
+    pub path: SearchPath,
+    /// It is not one that may go a long way round because others were blocked.
+    pub sure: bool,
+}
+
+/// A way through the middle of the free space.
+struct Middle {
+    path: SearchPath,
+    /// What the first one takes that was tried, with all its corners, s.
+    wanted: f64,
 }
 
 /// How the lattice search ended without a path.
@@ -116,33 +131,65 @@ impl<'a, const W: usize> Solver<'a, W> {
         !std::mem::replace(&mut self.touching, Bits::EMPTY).is_empty()
     }
 
-    /// The first that passes of the straight ways, those that count turns, and the guide's. None proves nothing.
-    pub fn guided(&self) -> Option<SearchPath> {
-        let Problem { query, options, .. } = self.problem;
+    /// The first that passes of the straight ways, those that count turns, and the guide's; of a robot that can fold up the quickest of
+    /// several. None proves nothing.
+    pub fn guided(&self) -> Option<Guided> {
+        let Problem { robot, query, options, .. } = self.problem;
         // Its places are tried one by one, by `region`.
         if query.goal_within > 0.0 {
             return None;
         }
         for route in astar::straight_to_goal(query, options) {
             if let Ok(path) = self.finish(&route, Grain::COARSE, &self.collider, 0) {
-                return Some(path);
+                return Some(Guided { path, sure: true });
             }
         }
-        match self.headed() {
-            Some((path, attempt)) if attempt < SURE => Some(path),
+        if self.collider.postures.folded().is_some() {
+            return self.quickest();
+        }
+        let sure = |path| Guided { path, sure: true };
+        // What backing up may save is left to the others, and so are robots that must fold: it knows nothing of postures, and with
+        // two blades between arches its ways were blocked so often that they took longer to find and were no faster.
+        let counts_turns = !options.reverse && robot.joints.is_empty();
+        match if counts_turns { self.headed(turn_cost(robot)) } else { None } {
+            Some((path, attempt)) if attempt < SURE => Some(sure(path)),
             // What was blocked so often may have gone a long way round.
             Some((path, _)) => {
-                let better = self.through_the_middle().filter(|other| self.estimate(other) < self.estimate(&path));
-                Some(better.unwrap_or(path))
+                let better = self.through_the_middle(true).map(|middle| middle.path);
+                let better = better.filter(|other| self.estimate(other) < self.estimate(&path));
+                Some(sure(better.unwrap_or(path)))
             }
-            None => self.through_the_middle(),
+            None => self.through_the_middle(true).map(|middle| sure(middle.path)),
         }
+    }
+
+    /// The quickest of the first ways that pass: the guide's, one that counts turns, and, where the guide's first was blocked and what was
+    /// found takes longer than it would have, one that keeps out of narrow gaps, which may be blocked by what the robot carries.
+    fn quickest(&self) -> Option<Guided> {
+        let Problem { robot, options, .. } = self.problem;
+        let quicker = |a: Option<SearchPath>, b: Option<SearchPath>| {
+            a.into_iter().chain(b).min_by(|a, b| seconds(robot, a).total_cmp(&seconds(robot, b)))
+        };
+        let middle = self.through_the_middle(true);
+        let wanted = middle.as_ref().map_or(f64::INFINITY, |middle| middle.wanted);
+        let headed = if options.reverse { None } else { self.headed(standing_turn_cost(robot)) };
+        let mut best = quicker(middle.map(|middle| middle.path), headed.map(|(path, _)| path));
+        let sure = |best: &Option<SearchPath>| best.as_ref().is_some_and(|path| seconds(robot, path) <= wanted);
+        if !sure(&best) {
+            best = quicker(best, self.wide());
+        }
+        let sure = sure(&best);
+        best.map(|path| Guided { path, sure })
+    }
+
+    /// The guide's first way that passes and keeps out of gaps whose middle lies between positions of the lattice.
+    pub fn wide(&self) -> Option<SearchPath> {
+        self.through_the_middle(false).map(|middle| middle.path)
     }
 
     /// What a path takes, as metres of straight driving.
     fn estimate(&self, path: &SearchPath) -> f64 {
-        let turned: f64 = path.states.windows(2).map(|w| (w[1].pose.yaw - w[0].pose.yaw).abs()).sum();
-        path.length() + turn_cost(self.problem.robot) * turned
+        path.length() + turn_cost(self.problem.robot) * turned(path)
     }
 
     /// The clearance of the base's core about a position, and the least with which the base may pass there, m. So is that of
@@ -167,17 +214,12 @@ impl<'a, const W: usize> Solver<'a, W> {
     }
 
     /// The cheapest way of metres and turns, as often as it is worth a try, and after how many that were blocked.
-    fn headed(&self) -> Option<(SearchPath, usize)> {
-        let Problem { map, robot, query, options, .. } = self.problem;
-        // What backing up may save is left to the others, and so are robots that must fold: it knows nothing of postures, and with
-        // two blades between arches its ways were blocked so often that they took longer to find and were no faster.
-        if options.reverse || !robot.joints.is_empty() {
-            return None;
-        }
+    fn headed(&self, turn_cost: f64) -> Option<(SearchPath, usize)> {
+        let Problem { map, query, .. } = self.problem;
         let (guess, least) = self.guessed_clearance();
         let bounds = map.bounds();
         let area = [bounds.min, bounds.max].map(|corner| [corner[0], corner[1]]);
-        let mut headed = Headed::new(query, guess, least, area, turn_cost(robot));
+        let mut headed = Headed::new(query, guess, least, area, turn_cost);
         for attempt in 0..headed::TRIES {
             let route = headed.route(attempt)?;
             match self.finish(&route, grain_of_try(attempt), &self.collider, 0) {
@@ -190,29 +232,51 @@ impl<'a, const W: usize> Solver<'a, W> {
 
     /// The way through the middle of the free space, as often as it is worth a try. Of a robot that can fold up also that of the
     /// folded one: the first leads where the base gets through, the second where most of what it carries does.
-    fn through_the_middle(&self) -> Option<SearchPath> {
-        let Problem { query, options, .. } = self.problem;
+    /// `narrow`: also where that lies between positions of the lattice.
+    fn through_the_middle(&self, narrow: bool) -> Option<Middle> {
+        let Problem { robot, query, options, .. } = self.problem;
+        let mut wanted = None;
         let (guess, least) = self.guessed_clearance();
-        let mut guides = vec![Guide::new(&self.lattice, Box::new(guess) as Guess<'a>, least)];
+        let fits = |posture| if narrow { self.fits(posture) } else { Box::new(|_| false) };
+        let mut guides = vec![Guide::new(&self.lattice, Box::new(guess) as Guess<'a>, fits(None), least)];
         if let Some(posture) = self.collider.postures.folded() {
-            guides.push(Guide::new(&self.lattice, self.clearance_folded(posture), least));
+            guides.push(Guide::new(&self.lattice, self.clearance_folded(posture), fits(Some(posture)), least));
         }
         for attempt in 0..guide::tries(query) {
             for which in 0..guides.len() {
-                let Some(route) = guides[which].route(query, options, attempt) else {
+                let Some(routes) = guides[which].routes(query, options, attempt) else {
                     if which == 0 {
                         return None;
                     }
                     guides.truncate(which);
                     break;
                 };
-                match self.finish(&route, grain_of_try(attempt), &self.collider, 0) {
-                    Ok(path) => return Some(path),
-                    Err(places) => places.into_iter().for_each(|place| guides[which].avoid(place)),
+                let wanted = *wanted.get_or_insert(routes[0].cost(standing_turn_cost(robot), 1.0) / robot.base.speed);
+                let mut blocked = Vec::new();
+                for route in &routes {
+                    match self.finish(route, grain_of_try(attempt), &self.collider, 0) {
+                        Ok(path) => return Some(Middle { path, wanted }),
+                        Err(places) => blocked = places,
+                    }
                 }
+                blocked.into_iter().for_each(|place| guides[which].avoid(place));
             }
         }
         None
+    }
+
+    /// Whether the base's core, and an upright cylinder that holds all that moves in a posture, keep their clearance with the base at a
+    /// position, exactly.
+    fn fits(&self, posture: Option<usize>) -> Fits<'a> {
+        let Problem { map, options, .. } = self.problem;
+        let [x, y] = self.core.offset;
+        let radius = self.core.radius + options.clearance - real::hypot(x, y);
+        let core = Upright { radius, heights: self.core.heights };
+        let column = posture.map(|posture| {
+            let (radius, heights) = self.collider.column(posture);
+            Upright { radius: radius + options.clearance, heights }
+        });
+        Box::new(move |place| core.fits(map, place) && column.as_ref().is_none_or(|column| column.fits(map, place)))
     }
 
     /// The clearance of an upright cylinder that holds all that moves in a posture, and of the core, about a position, m.
@@ -304,6 +368,22 @@ fn grain_of_try(attempt: usize) -> Grain {
 /// Metres of straight driving that take as long as a radian of turning, whatever its radius (\[SCR\] Eq. 14).
 fn turn_cost(robot: &RobotModel) -> f64 {
     (robot.track_width / (2.0 * robot.base.eta)).clamp(LEAST_TURN_COST, MOST_TURN_COST)
+}
+
+/// The same at the greatest speed and turn rate, where only one of them is used at a time.
+fn standing_turn_cost(robot: &RobotModel) -> f64 {
+    (robot.base.speed / robot.base.angular_speed).clamp(LEAST_TURN_COST, MOST_TURN_COST)
+}
+
+/// How far the base turns along a path, rad.
+fn turned(path: &SearchPath) -> f64 {
+    path.states.windows(2).map(|w| (w[1].pose.yaw - w[0].pose.yaw).abs()).sum()
+}
+
+/// What a path takes as driven, to compare it with others, s: with arms of seven joints, in rooms of 20 m, the motions made of such
+/// paths took 0.8 s a metre and 0.7 s a radian at 1 m/s and 1.25 rad/s, and the joints moved meanwhile.
+pub fn seconds(robot: &RobotModel, path: &SearchPath) -> f64 {
+    (path.length() + standing_turn_cost(robot) * turned(path)) / robot.base.speed
 }
 
 /// The postures and a way out of the one at an end, where no way that is there already leads out of it.
