@@ -2,8 +2,11 @@
 
 mod attempts;
 mod check;
+mod ends;
+mod goals;
 mod place;
 mod plan;
+mod refusal;
 mod stops;
 mod world;
 
@@ -15,19 +18,18 @@ pub use world::world;
 
 use std::time::Instant;
 
-use crate::certify::{self, Certificate, Demands, Goal, RefusalKind, Task, Trust, Via};
+use crate::certify::{self, Certificate, Demands, LinkGoal, Task, Trust};
 use crate::command::{self, CommandTable, SampleOptions};
 use crate::diag::{Describe, Diagnostic, Diagnostics};
-use crate::geom::{Pose2, wrap_angle};
 use crate::map::VoxelMap;
-use crate::math::real;
-use crate::mission::{Mission, Parameterisation, PathSpec, PoseSpec, TimeLaw, Tolerance};
-use crate::report::schema::{InputFile, InputsPart};
-use crate::report::schema::{ProfilePart, TrajectoryPart, TrustPart};
+use crate::mission::{Mission, Parameterisation, TimeLaw};
+use crate::report::schema::{InputFile, InputsPart, ProfilePart, TrajectoryPart};
 use crate::report::{Report, metrics, path_error};
 use crate::retime::{self, MotionProfile, RetimeOptions};
 use crate::robot::{Files, RobotModel, spec::RobotSpec};
-use crate::trajectory::{Leg, Trajectory, TrajectorySource, given, steered_curve::SteeredCurve};
+use crate::trajectory::{Trajectory, TrajectorySource};
+use ends::{end_of, given_path, goal, link_goal, start_of};
+use refusal::refused;
 
 /// A text file that was read.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -258,7 +260,8 @@ fn stages(
     let World { robot, map } = world;
     run.report.robot = Some(robot.into());
     run.report.map = map.as_deref().map(Into::into);
-    let finish = Finish { mission, robot, map: map.as_deref(), sampling_time };
+    let link = link_goal(mission, robot);
+    let finish = Finish { mission, robot, map: map.as_deref(), sampling_time, link };
     let made = match (given, map) {
         (Some(trajectory), _) => finish.certify(run, trajectory)?,
         (None, Some(map)) => plan::plan(run, &finish, map, options)?,
@@ -278,12 +281,9 @@ fn stages(
     run.report.judge(&certificate);
     // With a tolerance in force, certified commands can be trusted to their end, and a refusal says where they cannot.
     if options.trust && (certificate.holds() || robot.tolerance.is_some()) {
-        let tolerance = robot.tolerance.unwrap_or(Tolerance::ASSUMED);
         let task = finish.task(&trajectory);
-        let map = map.as_deref();
-        let trust = run.stage("trust", || certify::trust(&commands, robot, map, &task, tolerance));
-        run.report.trust = trust.as_ref().map(|t| TrustPart::new(t, robot.tolerance.is_some(), map.is_some()));
-        run.traces.trust = trust;
+        let trust = run.stage("trust", || check::trust_in(world, &commands, &task));
+        (run.traces.trust, run.report.trust) = trust.unzip();
     }
     if !certificate.holds() {
         run.traces.refused = Some(commands);
@@ -320,6 +320,8 @@ struct Finish<'a> {
     robot: &'a RobotModel,
     map: Option<&'a VoxelMap>,
     sampling_time: f64,
+    /// Where a link must be at the end.
+    link: Option<LinkGoal>,
 }
 
 impl Finish<'_> {
@@ -332,7 +334,9 @@ impl Finish<'_> {
     /// The same of a task that is not the mission's.
     fn certify_task(&self, run: &mut Run<'_>, trajectory: Trajectory, task: &Task) -> Result<Made, Diagnostics> {
         let (profile, commands) = self.commands(run, &trajectory)?;
-        let demands = Demands { vias: &[], zones: self.mission.speed_zones() };
+        // Of a mission with stops only the last stretch leads there, which the proof of the whole looks at.
+        let link = self.link.as_ref().filter(|_| self.mission.via.is_empty());
+        let demands = Demands { vias: &[], zones: self.mission.speed_zones(), link };
         let certificate =
             run.stage("certify", || certify::certify_through(&commands, self.robot, self.map, task, demands));
         Ok(Made { trajectory, profile, commands, certificate })
@@ -399,169 +403,6 @@ impl Finish<'_> {
 
     fn clearance(&self, table: &CommandTable, task: &Task) -> Option<f64> {
         self.map.map(|map| certify::clearance_proven(table, self.robot, map, task))
-    }
-}
-
-/// Where a trajectory starts: pose and joint values.
-fn start_of(trajectory: &Trajectory) -> (Pose2, Vec<f64>) {
-    match &trajectory.legs[0] {
-        Leg::Still(still) => (still.pose, still.joints_from.clone()),
-        Leg::Drive(drive) => {
-            let value = |d| drive.curve.derivative(d, 0, 0.0);
-            let dims = drive.curve.pieces[0].coefficients.len();
-            (Pose2::new(value(0), value(1), drive.yaw_start), (2..dims).map(value).collect())
-        }
-        Leg::Steer(steer) => {
-            let dims = steer.curve.pieces[0].coefficients.len();
-            (steer.pose, (2..dims).map(|d| steer.curve.derivative(d, 0, 0.0)).collect())
-        }
-    }
-}
-
-/// Where a trajectory ends.
-fn end_of(trajectory: &Trajectory) -> Pose2 {
-    match &trajectory.legs[trajectory.legs.len() - 1] {
-        Leg::Still(still) => Pose2 { yaw: still.yaw_end, ..still.pose },
-        Leg::Drive(drive) => {
-            let end = drive.curve.duration();
-            let [x, y, dx, dy] =
-                [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(d, order)| drive.curve.derivative(d, order, end));
-            let yaw = real::atan2(dy, dx) + if drive.reverse { std::f64::consts::PI } else { 0.0 };
-            Pose2::new(x, y, wrap_angle(yaw))
-        }
-        // Only planned motions have such legs, and those that cannot be tabulated have been refused.
-        Leg::Steer(steer) => SteeredCurve::new(steer).map_or(steer.pose, |curve| curve.end_pose()),
-    }
-}
-
-/// Where the commands must end: as the mission says, else where its given path does; what neither says is open. (A mission
-/// without a path has a goal position; its reader sees to that.)
-fn goal(mission: &Mission, robot: &RobotModel, given_end: Option<Pose2>) -> Goal {
-    let asked = mission.goal.as_ref();
-    let of = |own: fn(&PoseSpec) -> Option<f64>, end: fn(Pose2) -> f64| asked.and_then(own).or(given_end.map(end));
-    Goal {
-        x: of(|g| g.x, |end| end.x).unwrap_or_default(),
-        y: of(|g| g.y, |end| end.y).unwrap_or_default(),
-        within: asked.map_or(0.0, |g| g.within),
-        yaw: of(|g| g.yaw, |end| end.yaw),
-        joints: robot.joints.iter().map(|j| asked.and_then(|g| g.joints.get(&j.name).copied())).collect(),
-    }
-}
-
-/// A place as the certificate is asked for it; its position is there.
-fn place_of(place: &PoseSpec, robot: &RobotModel) -> Goal {
-    Goal {
-        x: place.x.unwrap_or_default(),
-        y: place.y.unwrap_or_default(),
-        within: place.within,
-        yaw: place.yaw,
-        joints: robot.joints.iter().map(|joint| place.joints.get(&joint.name).copied()).collect(),
-    }
-}
-
-/// Where the commands must stop on the way.
-fn vias(mission: &Mission, robot: &RobotModel) -> Vec<Via> {
-    mission.via.iter().map(|via| Via { place: place_of(&via.place, robot), dwell: via.dwell }).collect()
-}
-
-/// The mission's own path as a trajectory.
-fn given_path(
-    mission: &Mission,
-    path: &PathSpec,
-    csv: Option<&TextFile>,
-    robot: &RobotModel,
-) -> Result<Trajectory, Diagnostics> {
-    let start = mission.start.clone().unwrap_or_default();
-    let held: Vec<f64> = robot
-        .joints
-        .iter()
-        .map(|j| start.joints.get(&j.name).copied().unwrap_or(0f64.clamp(j.lower, j.upper)))
-        .collect();
-    let trajectory = match (path, csv) {
-        (PathSpec::Bezier(segments), _) => given::from_bezier(segments, &held)
-            .map_err(|error| Diagnostics::from(error.diagnostic().maybe_at(mission.spans.path.as_ref())))?,
-        (PathSpec::File(_), Some(csv)) => given::from_csv(&csv.name, &csv.text, robot, &held)?,
-        (PathSpec::File(file), None) => {
-            let message = format!("path file `{}` was not read", file.display());
-            return Err(Diagnostic::error("mission/path-not-read", message)
-                .maybe_at(mission.spans.path_file.as_ref())
-                .hint("give its text along with the mission's")
-                .into());
-        }
-    };
-    let (first, _) = start_of(&trajectory);
-    let last = end_of(&trajectory);
-    let ends =
-        [("start", &mission.start, first, &mission.spans.start), ("goal", &mission.goal, last, &mission.spans.goal)];
-    for (which, spec, own, span) in ends {
-        let Some(spec) = spec else { continue };
-        let off = |a: Option<f64>, b: f64| a.is_some_and(|a| (a - b).abs() > 1e-6);
-        let elsewhere = match spec.x.zip(spec.y) {
-            Some((x, y)) if spec.within > 0.0 => real::hypot(x - own.x, y - own.y) > spec.within,
-            _ => off(spec.x, own.x) || off(spec.y, own.y),
-        };
-        if elsewhere || spec.yaw.is_some_and(|yaw| wrap_angle(yaw - own.yaw).abs() > 1e-6) {
-            let message = format!(
-                "`{which}` contradicts the given path, which has x {:.6}, y {:.6}, heading {:.6} rad there",
-                own.x, own.y, own.yaw
-            );
-            let fault = Diagnostic::error("mission/path-end", message).maybe_at(span.as_ref());
-            return Err(fault.hint(format!("leave `{which}` out, or keep only its joints")).into());
-        }
-    }
-    Ok(trajectory)
-}
-
-fn refused(certificate: &Certificate, source: TrajectorySource) -> Diagnostic {
-    let reasons: Vec<&str> = certificate.refusals.iter().map(|r| r.message.as_str()).collect();
-    let too_close = certificate.refusals.iter().all(|r| r.kind == RefusalKind::Clearance);
-    let too_wide = certificate.refusals.iter().any(|r| r.kind == RefusalKind::Tolerance);
-    let own_links = certificate.refusals.iter().any(|r| r.kind == RefusalKind::OwnLinks);
-    let hint = match source {
-        _ if too_wide => return refused_for_tolerance(certificate, &reasons.join("; ")),
-        _ if own_links => {
-            "other joint values at start and goal may keep them apart; where shapes are drawn too large, name the pair in robot.yaml's \
-             `collision: {ignore_pairs}`: `trajc robot init URDF` lists such pairs"
-        }
-        TrajectorySource::Given if too_close => {
-            "a given path is driven as it is: lead it around the obstacle, or lower `clearance_m`"
-        }
-        _ if too_close => "lower `clearance_m`, or shorten `sampling_time_s`: held commands cut curves",
-        _ => "lower `clearance_m` or the speed limits, or shorten `sampling_time_s`",
-    };
-    Diagnostic::failure("certify/refused", format!("the certificate is refused: {}", reasons.join("; "))).hint(hint)
-}
-
-/// The message of a motion that the model's robot can drive, but not every robot within the tolerance.
-fn refused_for_tolerance(certificate: &Certificate, reasons: &str) -> Diagnostic {
-    let inside = certificate.tolerance.as_ref();
-    let shares = inside.and_then(|inside| inside.there).map(|(_, shares)| shares).unwrap_or_default();
-    let remedy = match shares.most().0 {
-        "latency_s" => "a controller that is less late, or slower joints (`limits`)",
-        "start_m" | "start_rad" => "a start that is set more exactly",
-        _ => "wheels and track that are calibrated, for a smaller `tolerance`",
-    };
-    let hint = format!(
-        "{remedy}; a shorter way between places where feedback sets the robot right; or a smaller `clearance_m`, which every robot \
-         within the tolerance keeps"
-    );
-    let mut fault =
-        Diagnostic::failure("certify/tolerance", format!("the certificate is refused: {reasons}")).hint(hint);
-    for (key, share) in shares.named() {
-        fault = fault.number(share_key(key), share);
-    }
-    fault
-}
-
-/// The name of a tolerance's share among a report's numbers.
-fn share_key(key: &str) -> &'static str {
-    match key {
-        "wheel_radius" => "share_wheel_radius_m",
-        "wheel_difference" => "share_wheel_difference_m",
-        "track" => "share_track_m",
-        "latency_s" => "share_latency_m",
-        "start_m" => "share_start_m",
-        _ => "share_start_heading_m",
     }
 }
 

@@ -24,6 +24,8 @@ pub use series::{Instant, distances};
 pub use trust::{Trust, TubePoint, trust, tube_along};
 pub use tube::{Shares, Width};
 
+use nalgebra::UnitQuaternion;
+
 use crate::command::CommandTable;
 use crate::geom::{Aabb, Pose2};
 use crate::map::VoxelMap;
@@ -34,6 +36,8 @@ use crate::robot::RobotModel;
 pub const END_POINT_TOLERANCE: f64 = 1e-3;
 /// Ends within this angle of the goal's heading (joints: of their values), rad. 0.1 degrees.
 pub const END_ANGLE_TOLERANCE: f64 = 0.1 * std::f64::consts::PI / 180.0;
+/// A link that must be turned some way at the goal is turned so to this, rad. 1 degree.
+pub const LINK_ANGLE_TOLERANCE: f64 = std::f64::consts::PI / 180.0;
 
 /// What the commands must do.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,13 +85,41 @@ pub struct Via {
     pub dwell: f64,
 }
 
-/// What a mission asks of the way besides its end.
+/// Where the frame of a link must be at the end.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinkGoal {
+    /// Index into [`RobotModel::links`].
+    pub link: usize,
+    /// Of the frame's origin, map frame, m; z over the ground that the base stands on.
+    pub position: [f64; 3],
+    /// How far from there will do, m.
+    pub within: f64,
+    /// Of the frame against the map's axes, to [`LINK_ANGLE_TOLERANCE`]; `None`: any.
+    pub rotation: Option<UnitQuaternion<f64>>,
+}
+
+/// Where the link of a [`LinkGoal`] ends.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinkEnd {
+    /// URDF name.
+    pub link: String,
+    /// From its place, m.
+    pub point_error: f64,
+    /// What that may be, m.
+    pub allowed: f64,
+    /// rad; `None` where the goal leaves open how the link is turned.
+    pub angle_error: Option<f64>,
+}
+
+/// What a mission asks of a motion besides its task.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Demands<'a> {
     /// Where the robot must stand, in this order.
     pub vias: &'a [Via],
     /// Where the base must be slow.
     pub zones: &'a [SpeedZone],
+    /// Where a link must be at the end.
+    pub link: Option<&'a LinkGoal>,
 }
 
 /// How fast the base is in a speed zone.
@@ -130,6 +162,8 @@ pub struct Certificate {
     pub end_point_allowed: f64,
     /// rad; `None` where the goal leaves the heading open.
     pub end_heading_error: Option<f64>,
+    /// Where the link ends that the goal names; `None`: it names none.
+    pub link_end: Option<LinkEnd>,
     /// Each via in order, as far as they were reached.
     pub vias: Vec<Reached>,
     /// Each speed zone of the mission, in its order.
@@ -275,6 +309,7 @@ pub fn certify_through(
         end_point_error: f64::INFINITY,
         end_point_allowed: task.goal.allowed(),
         end_heading_error: task.goal.yaw.map(|_| f64::INFINITY),
+        link_end: None,
         vias: Vec::new(),
         zones: Vec::new(),
         limits: Vec::new(),
@@ -301,6 +336,11 @@ pub fn certify_through(
     certificate.end_point_error = ends.point;
     certificate.end_heading_error = ends.heading;
     certificate.refusals.extend(ends.refusals);
+    if let Some(goal) = demands.link {
+        let (end, refusals) = ends::link_end(&rollout, robot, goal);
+        certificate.link_end = Some(end);
+        certificate.refusals.extend(refusals);
+    }
     let (reached, missed) = vias::vias(&rollout, &table::standing(table), robot, demands.vias);
     certificate.vias = reached;
     certificate.refusals.extend(missed);

@@ -124,6 +124,15 @@ mod tests {
 
     use super::*;
 
+    #[test]
+    fn what_is_within_a_tetrahedron_is_within_it_however_its_corners_are_named() {
+        // Corner c + a lies in the plane of b - a and d - a; the origin is a quarter of a, a tenth of b, half of c and the rest of d.
+        let corners = [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [-1.0, -0.2, -0.3], [1.0, 0.0, 1.0]].map(Vector3::from);
+        for [i, j, k, l] in [[0, 1, 2, 3], [1, 0, 2, 3], [0, 2, 1, 3], [0, 3, 2, 1], [2, 1, 0, 3], [3, 1, 2, 0]] {
+            assert!(on_tetrahedron(corners[i], corners[j], corners[k], corners[l]).is_none());
+        }
+    }
+
     fn point() -> impl Strategy<Value = Vector3<f64>> {
         [-1.0..1.0, -1.0..1.0, -1.0..1.0f64].prop_map(Vector3::from)
     }

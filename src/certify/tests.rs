@@ -2,6 +2,7 @@
 
 mod clearance;
 mod faults;
+mod links;
 mod own_links;
 pub(crate) mod peer;
 pub(crate) mod robots;

@@ -160,6 +160,15 @@ fn of_mission(path: &Path) -> Result<Understood, Diagnostics> {
         let joints: Vec<String> = p.joints.iter().map(|(name, v)| format!("{name} {v}")).collect();
         let within = if p.within > 0.0 { format!(" (anywhere within {} m)", p.within) } else { String::new() };
         let [x, y, yaw] = [p.x, p.y, p.yaw].map(number);
+        if let Some(link) = &p.link {
+            let [x, y, z] = link.position;
+            let turned = link.rpy.map_or(String::new(), |[r, p, y]| format!(", turned by {r}, {p}, {y} rad"));
+            let (name, within) = (&link.name, link.within);
+            return format!(
+                "link {name} within {within} m of x {x} m, y {y} m, z {z} m{turned}; yaw {yaw} rad {}",
+                joints.join(", ")
+            );
+        }
         format!("x {x} m, y {y} m{within}, yaw {yaw} rad {}", joints.join(", "))
     };
     let vias = mission.via.iter().map(|via| ("via", Some(&via.place)));

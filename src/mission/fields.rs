@@ -4,6 +4,8 @@ use super::{Parameterisation, Sampling, TimeLaw};
 use crate::diag::shape::{Bounds, Choice, Field, LARGE, Shape};
 
 pub(super) const METRES: Shape = Shape::Number(Bounds::any("m"));
+pub(super) const POINT_IN_SPACE: Shape =
+    Shape::List { item: &METRES, count: (3, 3), form: "[x, y, z] in metres: 3 numbers" };
 /// Shorter than 0.1 ms no controller holds a command, and the table would not fit in memory.
 const SAMPLING_TIME: Shape = Shape::Number(Bounds::between(1e-4, 10.0, "s"));
 
@@ -123,12 +125,7 @@ static MAP: [Field; 8] = [
         "occupied",
         "what space counts as that was never seen; default occupied",
     ),
-    Field::optional(
-        "origin_m",
-        Shape::List { item: &METRES, count: (3, 3), form: "[x, y, z] in metres: 3 numbers" },
-        "[0, 0, 0]",
-        "lower corner of a .npy grid, metres",
-    ),
+    Field::optional("origin_m", POINT_IN_SPACE, "[0, 0, 0]", "lower corner of a .npy grid, metres"),
     Field::optional(
         "keep_out",
         Shape::List { item: &super::solids::KEEP_OUT, count: (0, 1000), form: "a list of areas `{polygon_m: [...]}`" },
@@ -166,7 +163,34 @@ const WITHIN: Field = Field::optional(
 );
 const ANY_YAW: Shape = Shape::AngleOr(Bounds::any("rad"), "any");
 
-pub(super) static GOAL: [Field; 5] = [
+/// How far a link may be from its place where the mission does not say, m.
+pub(super) const LINK_WITHIN: f64 = 0.01;
+static ANGLE: Shape = Shape::Angle(Bounds::any("rad"));
+
+/// Where a link must be.
+pub(super) static LINK: [Field; 4] = [
+    Field::required("name", Shape::Text, "tool0", "the link's name in the URDF"),
+    Field::required(
+        "position_m",
+        POINT_IN_SPACE,
+        "[3.0, 2.0, 0.8]",
+        "where the origin of its frame must be, map frame, z over the ground; metres",
+    ),
+    Field::optional(
+        "rpy",
+        Shape::List { item: &ANGLE, count: (3, 3), form: "[roll, pitch, yaw]: 3 angles" },
+        "[0, 90deg, 0]",
+        "how its frame must be turned, roll, pitch, yaw against the map's axes, to 1 degree; left out: any way",
+    ),
+    Field::optional(
+        "within_m",
+        Shape::Number(Bounds::between(0.002, 1.0, "m")),
+        "0.01",
+        "how far from there will do, metres; default 0.01",
+    ),
+];
+
+pub(super) static GOAL: [Field; 6] = [
     Field::optional("x_m", METRES, "9.0", "metres, map frame"),
     Field::optional("y_m", METRES, "8.0", "metres, map frame"),
     WITHIN,
@@ -181,6 +205,12 @@ pub(super) static GOAL: [Field; 5] = [
         Shape::Named(&Shape::Angle(Bounds::any("rad or m"))),
         "{blade: 90deg}",
         "joint positions by name: radians, metres or degrees; left out: any",
+    ),
+    Field::optional(
+        "link",
+        Shape::Table(&LINK),
+        "{name: tool0, position_m: [3.0, 2.0, 0.8]}",
+        "where a link must be, instead of x_m and y_m: base and joints are the compiler's choice, but for what yaw and joints say",
     ),
 ];
 

@@ -83,6 +83,8 @@ pub struct MissionSpans {
     pub start_file: Option<Span>,
     /// `goal` with its value.
     pub goal: Option<Span>,
+    /// The value of `goal.link.name`.
+    pub goal_link: Option<Span>,
     /// Each item of `via`.
     pub via: Vec<Span>,
     /// `path` with its value.
@@ -163,6 +165,21 @@ pub struct PoseSpec {
     pub yaw: Option<f64>,
     /// Joint values by name: radians or metres.
     pub joints: BTreeMap<String, f64>,
+    /// Where a link must be, instead of the base: `x` and `y` are its position's then. Of goals.
+    pub link: Option<LinkSpec>,
+}
+
+/// Where the frame of a link must be at the goal; base and joints are the compiler's choice as far as nothing else says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinkSpec {
+    /// URDF name.
+    pub name: String,
+    /// Of the frame's origin, map frame, metres; z over the ground that the base stands on.
+    pub position: [f64; 3],
+    /// Roll, pitch and yaw of the frame against the map's axes, radians; `None`: any.
+    pub rpy: Option<[f64; 3]>,
+    /// How far from the position will do, metres.
+    pub within: f64,
 }
 
 /// A stop on the way.

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::fields::{GOAL, MISSION, PARAMETERISATIONS, PATH, SAMPLING_LAWS, START, TIME_LAWS};
+use super::fields::{GOAL, LINK_WITHIN, MISSION, PARAMETERISATIONS, PATH, SAMPLING_LAWS, START, TIME_LAWS};
 use super::{
-    MapSpec, Mission, MissionSpans, NamedJoint, Parameterisation, PathSpec, PoseSpec, Sampling, TimeLaw, Unknown,
-    ViaSpec, limits, solids, tolerance, zones,
+    LinkSpec, MapSpec, Mission, MissionSpans, NamedJoint, Parameterisation, PathSpec, PoseSpec, Sampling, TimeLaw,
+    Unknown, ViaSpec, limits, solids, tolerance, zones,
 };
 use crate::diag::shape::Field;
 use crate::diag::yaml::{Entry, Node};
@@ -92,13 +92,28 @@ fn map(node: &Node) -> MapSpec {
 
 fn pose(node: &Node) -> PoseSpec {
     let joints = node.get("joints").map_or(&[][..], Node::entries);
+    let link = node.get("link").and_then(link);
+    let own = |key: &str, axis: usize| {
+        node.get(key).and_then(Node::number).or(link.as_ref().map(|link: &LinkSpec| link.position[axis]))
+    };
     PoseSpec {
-        x: node.get("x_m").and_then(Node::number),
-        y: node.get("y_m").and_then(Node::number),
+        x: own("x_m", 0),
+        y: own("y_m", 1),
         within: node.get("within_m").and_then(Node::number).unwrap_or(0.0),
         yaw: node.get("yaw").and_then(Node::angle),
         joints: joints.iter().filter_map(|e| Some((e.key.clone(), e.value.angle()?))).collect(),
+        link,
     }
+}
+
+fn link(node: &Node) -> Option<LinkSpec> {
+    let angles: Option<Vec<f64>> = node.get("rpy").and_then(|rpy| rpy.items().iter().map(Node::angle).collect());
+    Some(LinkSpec {
+        name: node.get("name")?.text()?.to_owned(),
+        position: numbers(node.get("position_m")?)?,
+        rpy: angles.and_then(|angles| angles.try_into().ok()),
+        within: node.get("within_m").and_then(Node::number).unwrap_or(LINK_WITHIN),
+    })
 }
 
 fn via(node: &Node) -> ViaSpec {
@@ -152,6 +167,9 @@ fn spans(source: &Arc<Source>, root: &Node) -> MissionSpans {
         start: whole("start"),
         start_file: value("start", "file"),
         goal: whole("goal"),
+        goal_link: root
+            .get("goal")
+            .and_then(|goal| Some(Span::new(source, goal.get("link")?.get("name")?.range.clone()))),
         via: vias.iter().map(|via| Span::new(source, via.range.clone())).collect(),
         path: whole("path"),
         path_file: value("path", "file"),
@@ -233,6 +251,10 @@ impl Between<'_> {
             if key == "start" && self.has(&pose.value, table, "file") {
                 continue;
             }
+            if key == "goal" && self.has(&pose.value, table, "link") {
+                self.link_goal(&pose.value, faults);
+                continue;
+            }
             // Not a map at all: already said.
             let empty = matches!(&pose.value.value, yaml::Value::Map(_));
             let missing: Vec<String> =
@@ -247,6 +269,19 @@ impl Between<'_> {
                 let at = Span::new(self.source, pose.key_range.clone());
                 faults.push(Diagnostic::error("mission/missing-key", message).at(&at).hint(hint));
             }
+        }
+    }
+
+    /// The link's place is the goal: nothing else may say where the base stands.
+    fn link_goal(&self, goal: &Node, faults: &mut Vec<Diagnostic>) {
+        for key in ["x_m", "y_m", "within_m"] {
+            let Some(entry) = goal.entry(key) else { continue };
+            let at = Span::new(self.source, entry.key_range.clone());
+            let message = format!(
+                "`goal.{key}` and `goal.link` exclude each other: where the base stands follows from the link's place"
+            );
+            let hint = format!("remove `{key}`, or `link`; how far the link may be from its place is `link.within_m`");
+            faults.push(Diagnostic::error("mission/two-goals", message).at(&at).hint(hint));
         }
     }
 
@@ -271,6 +306,12 @@ impl Between<'_> {
     }
 
     fn given_path(&self, faults: &mut Vec<Diagnostic>) {
+        if let Some(link) = self.root.get("goal").and_then(|goal| goal.entry("link")) {
+            let at = Span::new(self.source, link.key_range.clone());
+            let message = "`goal.link` and a given `path` exclude each other: a given path ends where it does";
+            let hint = "remove `link`, or plan the way with `map` and `start`";
+            faults.push(Diagnostic::error("mission/link-and-path", message).at(&at).hint(hint));
+        }
         if let Some(via) = self.root.entry("via") {
             let at = Span::new(self.source, via.key_range.clone());
             let message = "`via` and a given `path` exclude each other: the path is driven as it is";

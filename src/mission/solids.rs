@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::fields::{METRES, POINT};
+use super::fields::{METRES, POINT, POINT_IN_SPACE};
 use crate::diag::shape::{Field, Shape};
 use crate::diag::yaml::Node;
 use crate::diag::{Diagnostic, Source, Span};
@@ -39,11 +39,9 @@ static KEEP_OUT_FIELDS: [Field; 2] = [
     ),
 ];
 
-const CORNER: Shape = Shape::List { item: &METRES, count: (3, 3), form: "[x, y, z] in metres: 3 numbers" };
-
 static BOX_FIELDS: [Field; 2] = [
-    Field::required("min_m", CORNER, "[2, 1, 0]", "the corner with the least x, y and z, metres"),
-    Field::required("max_m", CORNER, "[3, 2, 0.5]", "the opposite corner, metres"),
+    Field::required("min_m", POINT_IN_SPACE, "[2, 1, 0]", "the corner with the least x, y and z, metres"),
+    Field::required("max_m", POINT_IN_SPACE, "[3, 2, 0.5]", "the opposite corner, metres"),
 ];
 
 /// What to do about a polygon that crosses itself.

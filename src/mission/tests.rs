@@ -35,6 +35,9 @@ tolerance: {wheel_radius: 1%, wheel_difference: 0.02, track: 3%, latency_s: 0.04
 path: {bezier: [[[0, 0], [2, 0], [4, 2], [4, 4]], [[4, 4], [4, 5], [4, 6], [4, 7]]]}
 ";
 
+/// Not together with a place of the base.
+const LINK_GOAL: &str = "goal: {link: {name: tool0, position_m: [1, 2, 0.5], rpy: [0, 90deg, 1], within_m: 0.02}}\n";
+
 /// Not together with a given path, which [`FULL`] has.
 const VIA: &str =
     "via: [{x_m: 4.0, y_m: 4.5, within_m: 0.2, yaw: 90deg, joints: {blade: 1}, dwell_s: 2}, {x_m: 5.0, y_m: 6.0}]\n";
@@ -151,6 +154,25 @@ fn a_later_stage_can_point_at_what_it_refuses() {
 }
 
 #[test]
+fn a_goal_is_a_place_of_the_base_or_of_a_link() {
+    let goal = |text: &str| LEAST.replace("goal: {x_m: 3, y_m: 4}", &format!("goal: {{{text}}}"));
+    let text = goal("link: {name: tool0, position_m: [1, 2, 0.5], rpy: [0, 90deg, 1]}, yaw: 0.5");
+    let mission = good(&text);
+    let place = mission.goal.expect("written");
+    let rpy = Some([0.0, std::f64::consts::FRAC_PI_2, 1.0]);
+    let link = LinkSpec { name: "tool0".into(), position: [1.0, 2.0, 0.5], rpy, within: 0.01 };
+    assert_eq!((place.x, place.y, place.yaw, place.link), (Some(1.0), Some(2.0), Some(0.5), Some(link)));
+    assert_eq!(&text[mission.spans.goal_link.expect("written").range], "tool0");
+    for more in ["x_m: 1", "y_m: 1", "within_m: 0.1"] {
+        assert_eq!(codes(&goal(&format!("link: {{name: a, position_m: [1, 2, 3]}}, {more}"))), ["mission/two-goals"]);
+    }
+    assert_eq!(codes(&goal("link: {name: a, position_m: [1, 2]}")).len(), 1);
+    assert_eq!(codes(&goal("link: {position_m: [1, 2, 3]}")).len(), 1);
+    let given = "robot: r\ngoal: {link: {name: a, position_m: [1, 2, 3]}}\npath: {file: b.csv}\n";
+    assert_eq!(codes(given), ["mission/link-and-path"]);
+}
+
+#[test]
 fn a_start_is_a_pose_or_a_file_that_ends_there() {
     let text = LEAST.replace("{x_m: 1, y_m: 2, yaw: 0}", "{file: ../out/b/commands.mcap}");
     let mission = good(&text);
@@ -254,19 +276,21 @@ fn the_schema_has_exactly_the_keys_that_the_parser_knows() {
 
 #[test]
 fn the_mission_with_every_key_has_every_key() {
-    let source = Arc::new(Source { name: "a".into(), text: FULL.to_string() + VIA });
-    let root = yaml::load(&source).expect("yaml");
+    let load = |text: String| yaml::load(&Arc::new(Source { name: "a".into(), text })).expect("yaml");
+    let (root, of_link) = (load(FULL.to_string() + VIA), load(LINK_GOAL.into()));
     for (path, table) in all_tables() {
-        let node = path.iter().try_fold(&root, |at, key| match *key {
+        let whole = if path.starts_with(&["goal", "link"]) { &of_link } else { &root };
+        let node = path.iter().try_fold(whole, |at, key| match *key {
             "any_name" => at.get("blade"),
             "an_item" => at.items().first(),
             key => at.get(key),
         });
         let node = node.unwrap_or_else(|| panic!("{path:?}"));
         for field in table.iter().filter(|f| !matches!(f.shape, Shape::Later(_))) {
-            // Two ways to give a path or a start; this mission has the other one.
+            // Two ways to give a path, a start or a goal; this mission has the other one.
+            let other = [("path", "file"), ("start", "file"), ("goal", "link")].map(|(table, key)| (vec![table], key));
             assert!(
-                field.key == "file" && (path == ["path"] || path == ["start"]) || node.get(field.key).is_some(),
+                other.contains(&(path.clone(), field.key)) || node.get(field.key).is_some(),
                 "{path:?} {}",
                 field.key
             );

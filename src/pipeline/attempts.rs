@@ -156,7 +156,7 @@ impl Attempts<'_> {
         if let Some(since) = self.since.filter(|_| robot.tolerance.is_some()) {
             let (whole, task) = since.with(&made.commands, &task);
             made.certificate = run.stage("certify", || {
-                let demands = Demands { vias: &[], zones: mission.speed_zones() };
+                let demands = Demands { vias: &[], zones: mission.speed_zones(), link: None };
                 certify::certify_through(&whole, robot, *map, &task, demands)
             });
         }

@@ -1,7 +1,8 @@
 //! Command files that are there already: judged, measured.
 
-use super::{Inputs, World, end_of, given_path, goal, start_of, vias};
-use crate::certify::{self, Certificate, Demands, Task};
+use super::ends::{end_of, given_path, goal, link_goal, start_of, vias};
+use super::{Inputs, World};
+use crate::certify::{self, Certificate, Demands, Task, Trust};
 use crate::command::CommandTable;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::geom::Pose2;
@@ -22,7 +23,8 @@ pub fn check(inputs: &Inputs, world: &World, table: &CommandTable) -> Result<Cer
     let World { robot, map } = world;
     let mission = &inputs.mission;
     let task = task(inputs, robot, table)?;
-    let demands = Demands { vias: &vias(mission, robot), zones: mission.speed_zones() };
+    let link = link_goal(mission, robot);
+    let demands = Demands { vias: &vias(mission, robot), zones: mission.speed_zones(), link: link.as_ref() };
     Ok(certify::certify_through(table, robot, map.as_deref(), &task, demands))
 }
 
@@ -31,10 +33,17 @@ pub fn check(inputs: &Inputs, world: &World, table: &CommandTable) -> Result<Cer
 /// # Errors
 /// As [`check`].
 pub fn trust(inputs: &Inputs, world: &World, table: &CommandTable) -> Result<Option<TrustPart>, Diagnostics> {
+    let task = task(inputs, &world.robot, table)?;
+    Ok(trust_in(world, table, &task).map(|(_, part)| part))
+}
+
+/// The same of commands that are to do a task, with the tube.
+pub(super) fn trust_in(world: &World, table: &CommandTable, task: &Task) -> Option<(Trust, TrustPart)> {
     let World { robot, map } = world;
     let tolerance = robot.tolerance.unwrap_or(Tolerance::ASSUMED);
-    let trust = certify::trust(table, robot, map.as_deref(), &task(inputs, robot, table)?, tolerance);
-    Ok(trust.map(|trust| TrustPart::new(&trust, robot.tolerance.is_some(), map.is_some())))
+    let trust = certify::trust(table, robot, map.as_deref(), task, tolerance)?;
+    let part = TrustPart::new(&trust, robot.tolerance.is_some(), map.is_some());
+    Some((trust, part))
 }
 
 /// What the mission asks of a table; what it leaves open is as the table has it.

@@ -1,11 +1,11 @@
 //! Searching and optimising until something is certified.
 
 use super::attempts::{Attempts, Tries};
+use super::goals::{From, goals};
 use super::{CompileOptions, Finish, Made, Place, Run, stops};
 use crate::certify::RefusalKind;
 use crate::diag::{Describe, Diagnostics};
-use crate::geom::Pose2;
-use crate::mission::{Mission, PoseSpec};
+use crate::mission::Mission;
 use crate::report::metrics;
 use crate::report::schema::{InitialPart, SearchPart};
 use crate::robot::RobotModel;
@@ -14,6 +14,8 @@ use crate::trajectory::Trajectory;
 
 /// Clearance beyond what must be certified that the search asks for first, m: what held commands may leave of a path.
 pub const SEARCH_MARGIN: f64 = 2e-3;
+/// A motion that takes so many times as long as its path was expected to is compared with one along another path.
+const SLOW: f64 = 1.25;
 
 /// Searches and optimises until something is certified; the search's own path is the last try. With vias: from stop to stop.
 pub(super) fn plan(
@@ -26,17 +28,31 @@ pub(super) fn plan(
     if !finish.mission.via.is_empty() {
         return stops::plan(run, finish, map, compile);
     }
-    let query = query(finish.mission, finish.robot);
-    let path = route(run, finish, map, compile, &query).map_err(|error| place_search_error(finish.mission, &error))?;
+    let start = finish.mission.start.clone().unwrap_or_default();
+    let from = From::of(&start, finish.robot);
+    let goal = finish.mission.goal.clone().unwrap_or_default();
+    // A goal of a link can be reached in several ways; the first that is certified is taken.
+    let goals = goals(run, finish, map, compile, from, &goal)?;
+    goals.first_certified(Made::holds, |query| to_goal(run, finish, map, compile, query))
+}
+
+fn to_goal(
+    run: &mut Run<'_>,
+    finish: &Finish<'_>,
+    map: &Place,
+    compile: &CompileOptions,
+    query: &Query,
+) -> Result<Made, Diagnostics> {
+    let path = route(run, finish, map, compile, query).map_err(|error| place_search_error(finish.mission, &error))?;
     note(run, &path, finish.robot);
     let task = |trajectory: &Trajectory| finish.task(trajectory);
     let attempts = Attempts { finish, map, compile, task: &task, since: None };
-    let (made, other) = motion(run, &attempts, &path, &query)?;
+    let (made, other) = motion(run, &attempts, &path, query)?;
     if let Some(other) = other {
         note(run, &other, finish.robot);
     }
     if !made.certificate.holds()
-        && let Some(wider) = wider_route(run, &attempts, &query, &made)
+        && let Some(wider) = wider_route(run, &attempts, query, &made)
         && let Ok(again) = attempts.optimise(run, &wider)
         && again.certificate.holds()
     {
@@ -46,8 +62,8 @@ pub(super) fn plan(
     Ok(made)
 }
 
-/// The motion along a path. Where the first tries are refused it may be along another one, by more postures, which then is told:
-/// between those that were sampled something may have been in the way.
+/// The motion along a path. Where the first tries are refused it may be along another one, with more room or by more postures, which then
+/// is told: between those that were sampled something may have been in the way. The same where it takes much longer than expected.
 pub(super) fn motion(
     run: &mut Run<'_>,
     attempts: &Attempts<'_>,
@@ -58,18 +74,31 @@ pub(super) fn motion(
     if !search::has_more_postures(finish.robot) {
         return attempts.optimise(run, path).map(|made| (made, None));
     }
-    let first = match attempts.run(run, path, Tries::Soon) {
-        Ok(made) => return Ok((made, None)),
-        Err(nearest) => nearest,
-    };
     let field = map.field(compile.threads);
     let options = search_options(finish.mission, SEARCH_MARGIN);
-    let other = run.stage("search", || search::with_more_postures(map, field, finish.robot, query, &options));
-    if let Some(other) = other
-        && let Ok(made) = attempts.run(run, &other, Tries::Soon)
-    {
-        return Ok((made, Some(other)));
+    let first = attempts.run(run, path, Tries::Soon);
+    let expected = search::seconds(finish.robot, path);
+    let mut best = match first {
+        Ok(made) if made.commands.duration() <= SLOW * expected => return Ok((made, None)),
+        first => first.map(|made| (made, None)),
+    };
+    for another in [search::with_more_room, search::with_more_postures] {
+        // Either will do where there is none; a slow one is only compared with one that has more room.
+        let other = run.stage("search", || another(map, field, finish.robot, query, &options));
+        if let Some(other) = other.filter(|other| other.states != path.states)
+            && let Ok(made) = attempts.run(run, &other, Tries::Soon)
+            && best.as_ref().map_or(true, |(best, _)| made.commands.duration() < best.commands.duration())
+        {
+            best = Ok((made, Some(other)));
+        }
+        if best.is_ok() {
+            break;
+        }
     }
+    let first = match best {
+        Ok(best) => return Ok(best),
+        Err(nearest) => nearest,
+    };
     let made = match attempts.run(run, path, Tries::Late) {
         Ok(made) => made,
         Err(nearest) => attempts.as_searched(run, path, nearest.or(first))?,
@@ -92,6 +121,10 @@ fn wider_route(run: &mut Run<'_>, attempts: &Attempts<'_>, query: &Query, refuse
 }
 
 impl Made {
+    pub(super) fn holds(&self) -> bool {
+        self.certificate.holds()
+    }
+
     /// Whether the certificate refuses nothing but that every robot within the tolerance fits.
     pub(super) fn only_the_tolerance_refuses(&self) -> bool {
         let refusals = &self.certificate.refusals;
@@ -99,7 +132,7 @@ impl Made {
     }
 }
 
-fn search_options(mission: &Mission, margin: f64) -> SearchOptions {
+pub(super) fn search_options(mission: &Mission, margin: f64) -> SearchOptions {
     SearchOptions { clearance: mission.clearance + margin, reverse: mission.reverse }
 }
 
@@ -128,21 +161,6 @@ pub(super) fn note(run: &mut Run<'_>, path: &SearchPath, robot: &RobotModel) {
     run.report.search = Some(SearchPart::from(path));
     run.traces.route = path.states.iter().map(|state| [state.pose.x, state.pose.y]).collect();
     run.report.initial = Some(InitialPart { metrics: metrics::of_search(path, robot) });
-}
-
-/// What the search is asked.
-fn query(mission: &Mission, robot: &RobotModel) -> Query {
-    let [start, goal] = [&mission.start, &mission.goal].map(|p| p.clone().unwrap_or_default());
-    let pose = |p: &PoseSpec| Pose2::new(p.x.unwrap_or(0.0), p.y.unwrap_or(0.0), p.yaw.unwrap_or(0.0));
-    let joints = |p: &PoseSpec| robot.joints.iter().map(|j| p.joints.get(&j.name).copied()).collect();
-    Query {
-        start: pose(&start),
-        start_joints: joints(&start),
-        goal: pose(&goal),
-        goal_within: goal.within,
-        goal_yaw: goal.yaw,
-        goal_joints: joints(&goal),
-    }
 }
 
 /// Points a search error at the pose it is about.

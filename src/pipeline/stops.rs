@@ -1,26 +1,23 @@
 //! Missions with stops on the way: stretch by stretch from rest to rest, joined, and proven as one.
 
 use super::attempts::{Attempts, Since};
+use super::ends::{place_of, start_of, vias};
+use super::goals::{From, goals};
 use super::plan::{motion, note, route};
-use super::{CompileOptions, Finish, Made, Place, Run, place_of, refused, start_of, vias};
+use super::refusal::refused;
+use super::{CompileOptions, Finish, Made, Place, Run};
 use crate::certify::{self, Demands, Task};
 use crate::command::{CommandError, CommandTable, MOST_ROWS};
 use crate::diag::{Describe, Diagnostics};
 use crate::geom::Pose2;
-use crate::mission::{Mission, PoseSpec, Sampling, ViaSpec};
+use crate::mission::{Mission, Sampling, ViaSpec};
 use crate::retime::{self, RetimeOptions};
 use crate::robot::RobotModel;
-use crate::search::{Query, SearchPath};
+use crate::search::SearchPath;
 use crate::trajectory::{OptimiserOutcome, Trajectory, TrajectorySource};
 
 /// Rows of rest at a stop at least: after two of them neither differences nor second differences of commands know what was before.
 const LEAST_REST: usize = 2;
-
-/// Where a stretch begins.
-struct From {
-    pose: Pose2,
-    joints: Vec<Option<f64>>,
-}
 
 /// Plans each stretch as a mission of its own, from where the commands of the one before really end; then joins the commands with rows of
 /// rest between them, as many as the stop lasts, and has the whole certified, stops included. A stretch leaves what a via leaves open
@@ -34,25 +31,11 @@ pub(super) fn plan(
     let (mission, robot) = (finish.mission, finish.robot);
     let places = mission.via.iter().map(|via| &via.place).chain(&mission.goal);
     let start = mission.start.clone().unwrap_or_default();
-    let mut from = From { pose: pose(&start, 0.0), joints: joints(&start, robot) };
+    let mut from = From::of(&start, robot);
     let mut route_so_far: Option<SearchPath> = None;
     let mut stretches = Vec::new();
     for (index, place) in places.enumerate() {
-        let query = Query {
-            start: from.pose,
-            start_joints: from.joints.clone(),
-            goal: pose(place, 0.0),
-            goal_within: place.within,
-            goal_yaw: place.yaw,
-            goal_joints: joints(place, robot),
-        };
-        let path = route(run, finish, map, compile, &query).map_err(|error| {
-            let about = if error.is_about_start() { index } else { index + 1 };
-            of_stretch(finish, index, about, error.diagnostic().into())
-        })?;
         let before = route_so_far.take();
-        let mut so_far = joined_paths(before.clone(), &path);
-        note(run, &so_far, robot);
         let since = since(mission, &stretches);
         let task = |trajectory: &Trajectory| {
             let (start, start_joints) = start_of(trajectory);
@@ -60,20 +43,32 @@ pub(super) fn plan(
             Task { start, start_joints, goal, clearance: mission.clearance, reverse: mission.reverse }
         };
         let attempts = Attempts { finish, map, compile, task: &task, since: since.as_ref() };
-        let (made, other) =
-            motion(run, &attempts, &path, &query).map_err(|faults| of_stretch(finish, index, index + 1, faults))?;
-        if let Some(other) = &other {
-            so_far = joined_paths(before, other);
-            note(run, &so_far, robot);
-        }
-        route_so_far = Some(so_far);
-        if !made.certificate.holds() {
-            let why = refused(&made.certificate, made.trajectory.source);
-            run.traces.refused = Some(made.commands);
-            return Err(of_stretch(finish, index, index + 1, why.into()));
-        }
+        let goals = goals(run, finish, map, compile, from, place)
+            .map_err(|faults| of_stretch(finish, index, index + 1, faults))?;
+        let (made, path) = goals.first_certified(
+            |_| true,
+            |query| {
+                let path = route(run, finish, map, compile, query).map_err(|error| {
+                    let about = if error.is_about_start() { index } else { index + 1 };
+                    of_stretch(finish, index, about, error.diagnostic().into())
+                })?;
+                note(run, &joined_paths(before.as_ref(), &path), robot);
+                let of_goal = |faults| of_stretch(finish, index, index + 1, faults);
+                let (made, other) = motion(run, &attempts, &path, query).map_err(of_goal)?;
+                if let Some(other) = &other {
+                    note(run, &joined_paths(before.as_ref(), other), robot);
+                }
+                if !made.certificate.holds() {
+                    let why = refused(&made.certificate, made.trajectory.source);
+                    run.traces.refused = Some(made.commands);
+                    return Err(of_goal(why.into()));
+                }
+                Ok((made, other.unwrap_or(path)))
+            },
+        )?;
+        route_so_far = Some(joined_paths(before.as_ref(), &path));
         from = end_of(&made.commands, robot);
-        stretches.push((made, other.unwrap_or(path).length() > 0.0));
+        stretches.push((made, path.length() > 0.0));
     }
     let commands = joined_commands(mission, stretches.iter().map(|(made, _)| &made.commands)).map_err(|error| {
         let hint = "a shorter `dwell_s`, or a longer `sampling_time_s`";
@@ -85,7 +80,7 @@ pub(super) fn plan(
     let profile = run.stage("retime", || retime::retime_in(&trajectory, robot, &options, mission.speed_zones()))?;
     let task = finish.task(&trajectory);
     let stops = vias(mission, robot);
-    let demands = Demands { vias: &stops, zones: mission.speed_zones() };
+    let demands = Demands { vias: &stops, zones: mission.speed_zones(), link: finish.link.as_ref() };
     let certificate = run.stage("certify", || certify::certify_through(&commands, robot, finish.map, &task, demands));
     Ok(Made { trajectory, profile, commands, certificate })
 }
@@ -95,14 +90,6 @@ fn since(mission: &Mission, stretches: &[(Made, bool)]) -> Option<Since> {
     let (first, _) = stretches.first()?;
     let commands = joined_commands(mission, stretches.iter().map(|(made, _)| &made.commands)).ok()?;
     Some(Since { start: start_of(&first.trajectory), commands })
-}
-
-fn pose(place: &PoseSpec, otherwise: f64) -> Pose2 {
-    Pose2::new(place.x.unwrap_or(0.0), place.y.unwrap_or(0.0), place.yaw.unwrap_or(otherwise))
-}
-
-fn joints(place: &PoseSpec, robot: &RobotModel) -> Vec<Option<f64>> {
-    robot.joints.iter().map(|joint| place.joints.get(&joint.name).copied()).collect()
 }
 
 /// Where commands lead, as replayed.
@@ -141,8 +128,8 @@ fn of_stretch(finish: &Finish<'_>, stretch: usize, about: usize, faults: Diagnos
     Diagnostics(said.collect())
 }
 
-fn joined_paths(before: Option<SearchPath>, path: &SearchPath) -> SearchPath {
-    let Some(mut whole) = before else { return path.clone() };
+fn joined_paths(before: Option<&SearchPath>, path: &SearchPath) -> SearchPath {
+    let Some(mut whole) = before.cloned() else { return path.clone() };
     // The last state of the one is the first of the other, but for what the commands missed it by.
     whole.states.extend_from_slice(&path.states[1..]);
     whole.moves.extend_from_slice(&path.moves);

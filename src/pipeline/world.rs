@@ -26,7 +26,8 @@ pub fn world(inputs: &mut Inputs) -> Result<World, Diagnostics> {
         inputs.mission.start = Some(end_of(file, &robot, &inputs.mission)?);
     }
     let mission = &inputs.mission;
-    let faults = unknown_joints(mission, &robot);
+    let mut faults = unknown_joints(mission, &robot);
+    faults.extend(unknown_link(mission, &robot));
     if !faults.is_empty() {
         return Err(Diagnostics(faults));
     }
@@ -97,7 +98,20 @@ fn end_of(file: &StartFile, robot: &RobotModel, mission: &Mission) -> Result<Pos
     // Rounding may leave a joint a little outside its range.
     let value = |(joint, value): (&MovingJoint, &f64)| (joint.name.clone(), value.clamp(joint.lower, joint.upper));
     let joints = robot.joints.iter().zip(&last.joint_positions).map(value).collect();
-    Ok(PoseSpec { x: Some(end.x), y: Some(end.y), within: 0.0, yaw: Some(wrap_angle(end.yaw)), joints })
+    let yaw = Some(wrap_angle(end.yaw));
+    Ok(PoseSpec { x: Some(end.x), y: Some(end.y), yaw, joints, ..PoseSpec::default() })
+}
+
+/// The link that the goal names, where the robot has none of that name.
+fn unknown_link(mission: &Mission, robot: &RobotModel) -> Option<Diagnostic> {
+    let link = mission.goal.as_ref()?.link.as_ref()?;
+    let names = || robot.links.iter().map(|link| link.name.as_str());
+    if names().any(|name| name == link.name) {
+        return None;
+    }
+    let message = format!("`goal.link` names `{}`, which is no link of `{}`", link.name, robot.name);
+    let hint = suggestion(&link.name, names(), "its links are", "it has no link");
+    Some(Diagnostic::error("mission/unknown-link", message).maybe_at(mission.spans.goal_link.as_ref()).hint(hint))
 }
 
 /// Joints that the mission names and the robot does not move, or cannot hold at that value.

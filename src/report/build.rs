@@ -5,7 +5,8 @@ use serde_json::{Map, Value, json};
 use super::schema::*;
 use super::{Metrics, Report, Status, names};
 use crate::certify::{
-    Certificate, Closest, END_POINT_TOLERANCE, InTube, LimitCheck, Reached, Refusal, RefusalKind, Trust, ZoneSpeed,
+    Certificate, Closest, END_POINT_TOLERANCE, InTube, LimitCheck, LinkEnd, Reached, Refusal, RefusalKind, Trust,
+    ZoneSpeed,
 };
 use crate::command::CommandTable;
 use crate::diag::{Diagnostics, Severity};
@@ -235,6 +236,7 @@ impl From<&Certificate> for CertificatePart {
             end_point_error_m: finite(certificate.end_point_error),
             goal_within_m: Some(certificate.end_point_allowed).filter(|m| *m > END_POINT_TOLERANCE).and_then(finite),
             end_heading_error_rad: certificate.end_heading_error.and_then(finite),
+            link: certificate.link_end.as_ref().and_then(link),
             vias: certificate.vias.iter().filter_map(via).collect(),
             speed_zones: certificate.zones.iter().filter_map(zone).collect(),
             limits_hold: certificate.limits_hold,
@@ -245,6 +247,15 @@ impl From<&Certificate> for CertificatePart {
                 .map(|own| OwnLinksPart { pairs_checked: own.pairs, keep_apart: own.apart }),
         }
     }
+}
+
+fn link(end: &LinkEnd) -> Option<LinkPart> {
+    Some(LinkPart {
+        name: end.link.clone(),
+        point_error_m: finite(end.point_error)?,
+        within_m: finite(end.allowed)?,
+        angle_error_rad: end.angle_error.and_then(finite),
+    })
 }
 
 fn in_tube(proof: &InTube) -> InTubePart {
@@ -338,6 +349,7 @@ mod tests {
         Certificate {
             clearance_required: Some(0.05),
             clearance_proven: Some(0.0512),
+            link_end: None,
             closest: Some(Closest {
                 time: 12.3,
                 link: "left_blade".into(),

@@ -278,6 +278,9 @@ pub struct CertificatePart {
     /// rad; absent where the goal leaves the heading open.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub end_heading_error_rad: Option<f64>,
+    /// Where the link ends that the goal names; absent where it names none. `goal_within_m` is how far the link reaches then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub link: Option<LinkPart>,
     /// The mission's `via`, in order: each with the time at which the robot first stands there.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub vias: Vec<ViaPart>,
@@ -295,6 +298,20 @@ pub struct CertificatePart {
     /// The robot's links against each other; absent where none that are checked move against each other.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub own_links: Option<OwnLinksPart>,
+}
+
+/// Where a link ends that must be somewhere.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LinkPart {
+    /// URDF name.
+    pub name: String,
+    /// From its place, m.
+    pub point_error_m: f64,
+    /// What that may be, m.
+    pub within_m: f64,
+    /// How far it is from being turned as it is to be, rad; absent where that is open.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angle_error_rad: Option<f64>,
 }
 
 /// What was proven of every robot within the tolerance (`trust.tolerance`).

@@ -5,7 +5,7 @@ mod limits;
 use std::fmt::Write;
 
 use super::schema::{CertificatePart, LimitPart, Report, RobotPart, Status, TolerancePart, TrustPart, ZonePart};
-use crate::certify::{END_ANGLE_TOLERANCE, END_POINT_TOLERANCE};
+use crate::certify::{END_ANGLE_TOLERANCE, END_POINT_TOLERANCE, LINK_ANGLE_TOLERANCE};
 use crate::math::real;
 pub use limits::table as limits_table;
 
@@ -278,6 +278,14 @@ fn goal(out: &mut String, certificate: &CertificatePart) {
 
 /// How far from the goal the motion ends, in words.
 pub fn goal_text(certificate: &CertificatePart) -> Option<String> {
+    if let Some(link) = &certificate.link {
+        let (mut missed, mut allowed) = (length(link.point_error_m), length(link.within_m));
+        if let Some(angle) = link.angle_error_rad {
+            missed += &format!(" and {}", degrees(angle));
+            allowed += &format!(" and {}", degrees(LINK_ANGLE_TOLERANCE));
+        }
+        return Some(format!("missed by {missed} by link {}; allowed: {allowed}", link.name));
+    }
     let (error, region) = (certificate.end_point_error_m?, certificate.goal_within_m);
     let (mut missed, mut allowed) = (length(error), length(region.unwrap_or(END_POINT_TOLERANCE)));
     if region.is_some() {

@@ -22,6 +22,7 @@ mod obstacles;
 mod placed;
 mod posture;
 mod queue;
+mod reaching;
 mod region;
 mod roadmap;
 mod route;
@@ -38,6 +39,7 @@ use crate::robot::RobotModel;
 pub use collide::Contact;
 pub use error::{Absence, Blocked, SearchError, Tightest};
 use posture::Postures;
+pub use reaching::{LinkTarget, Placements, placements};
 pub use solve::seconds;
 use solve::{Guided, NoPath, Problem, Solver};
 

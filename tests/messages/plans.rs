@@ -50,10 +50,20 @@ pub fn cases() -> Vec<Case> {
             .found("`blad`").expected("joint").hint("did you mean `blade`?"),
         blades("joint_limits_loosened", "x_m: 0.6, y_m: 1.5, yaw: 0}\nlimits: {joints: {blade: {upper: 400deg}}").at(MISSION, "|blade: {upper")
             .found("6.98").expected("0 to 3.141").hint("within the URDF's range"),
+        goal("link_near", "link: {name: box_link, position_m: [3.4, 1.5, 0.2]}").at(MISSION, "|box_link").found("`box_link`")
+            .expected("no link of `box_base`").hint("did you mean `base_link`?"),
+        goal("link_out_of_reach", "link: {name: base_link, position_m: [3.4, 1.5, 1.2]}").exit(1).at(MISSION, "goal")
+            .found("`base_link` cannot come to (3.400, 1.500, 1.200)").expected("m off").hint("change `position_m`"),
+        goal("link_in_obstacle", "link: {name: base_link, position_m: [1.95, 1.5, 0]}").exit(1).at(MISSION, "goal")
+            .found("the goal is in collision").expected("the base at (1.950, 1.500)").hint("nearest free pose"),
+        goal("link_and_place", "x_m: 3.4, link: {name: base_link, position_m: [3.4, 1.5, 0]}").at(MISSION, "x_m: 3.4")
+            .found("`goal.x_m`").expected("exclude each other").hint("remove `x_m`, or `link`"),
+        goal("link_without_place", "link: {name: base_link}").at(MISSION, "link: {").found("`position_m`").expected("is missing")
+            .hint("position_m: [3.0, 2.0, 0.8]"),
         case("start_file_missing").edit(MISSION, START, "file: ../out/b/commands.csv").at(MISSION, "../out/b").found("`out/b/commands.csv`")
             .expected("no folder `out`").hint("compile"),
         case("too_many_rows").append(MISSION, "via: [{x_m: 2.0, y_m: 0.6, dwell_s: 86400}, {x_m: 2.0, y_m: 0.6, dwell_s: 86400}, {x_m: 2.0, y_m: 0.6, dwell_s: 86400}]\n")
-            .exit(1).at(MISSION, "via: [|{x_m").found("259216 s").expected("too many").hint("a shorter `dwell_s`"),
+            .exit(1).at(MISSION, "via: [|{x_m").found("the motion lasts 2592").expected("too many").hint("a shorter `dwell_s`"),
         case("start_chain_closes").with(|s| {
                 for (one, other) in [("a", "b"), ("b", "a")] {
                     let text = s.text(MISSION).replace("start: {x_m: 0.6, y_m: 1.5, yaw: 0deg}", "start: {file: NEXT}");

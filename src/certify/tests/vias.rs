@@ -11,7 +11,7 @@ use crate::robot::RobotModel;
 /// Drives 0.1 m along x in 1 s, stands for 0.3 s, drives as far again; a joint goes from 0 to 0.5 while it first drives.
 fn judged(vias: &[Via]) -> Certificate {
     let (robot, table, task) = motion();
-    certify_through(&table, &robot, None, &task, Demands { vias, zones: &[] })
+    certify_through(&table, &robot, None, &task, Demands { vias, zones: &[], link: None })
 }
 
 fn motion() -> (RobotModel, CommandTable, Task) {
@@ -110,7 +110,7 @@ fn anywhere_on_the_floor_a_stop_is_judged_by_its_distance_and_angle() {
     let judged = |off: [f64; 2], turn: f64, dwell: f64| {
         let yaw = Some(stop.yaw + turn + std::f64::consts::TAU);
         let place = Goal { x: stop.x + off[0], y: stop.y + off[1], within: 0.0, yaw, joints: vec![Some(0.5)] };
-        certify_through(&table, &robot, None, &task, Demands { vias: &[Via { place, dwell }], zones: &[] })
+        certify_through(&table, &robot, None, &task, Demands { vias: &[Via { place, dwell }], zones: &[], link: None })
     };
     let certificate = judged([3e-4, -4e-4], 1e-3, 0.3);
     assert!(certificate.holds(), "{:?}", certificate.refusals);

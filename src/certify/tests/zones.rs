@@ -10,7 +10,7 @@ fn judged(held: &[(f64, f64)], polygon: &[[f64; 2]], speed: f64) -> Certificate 
     let held: Vec<_> = held.iter().map(|(v, turn)| (*v, *turn, Vec::new())).collect();
     let (table, task) = commands(&robot, Pose2::default(), &[], 0.1, &held);
     let zones = [SpeedZone { polygon: polygon.to_vec(), speed }];
-    certify_through(&table, &robot, None, &task, Demands { vias: &[], zones: &zones })
+    certify_through(&table, &robot, None, &task, Demands { vias: &[], zones: &zones, link: None })
 }
 
 #[test]

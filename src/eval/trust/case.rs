@@ -33,7 +33,7 @@ pub(super) type Twist = (f64, f64, Vec<f64>);
 impl Case {
     /// The program's own verdict.
     pub fn certify(&self) -> Certificate {
-        let demands = Demands { vias: &self.vias, zones: &self.zones };
+        let demands = Demands { vias: &self.vias, zones: &self.zones, link: None };
         certify_through(&self.table, &self.robot, self.map.as_ref(), &self.task, demands)
     }
 

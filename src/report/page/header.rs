@@ -72,7 +72,11 @@ fn key_figures(report: &Report) -> Vec<(String, String)> {
     if let Some(row) = plots::own_row(report) {
         out.push(key("Path error", &mm(row.lateral_max_m), &format!("at most, at {} s a row", row.sampling_time_s)));
     }
-    if let Some(certificate) = &report.certificate
+    let link = report.certificate.as_ref().and_then(|certificate| certificate.link.as_ref());
+    if let Some(link) = link {
+        let turned = link.angle_error_rad.map_or(String::new(), |a| format!(", and {} of its turn", degrees(a)));
+        out.push(key("Off the goal", &mm(link.point_error_m), &format!("of link {}{turned}", link.name)));
+    } else if let Some(certificate) = &report.certificate
         && let Some(error) = certificate.end_point_error_m
     {
         let heading = certificate

@@ -3,7 +3,7 @@
 use super::actuators::{self, Actuator, PER, QUANTITIES};
 use super::html::{self, Cell, definitions, escape, instant, section};
 use super::{PageInputs, at_least_mm, counted, degrees, figure, mm};
-use crate::certify::{END_ANGLE_TOLERANCE, END_POINT_TOLERANCE};
+use crate::certify::{END_ANGLE_TOLERANCE, END_POINT_TOLERANCE, LINK_ANGLE_TOLERANCE};
 use crate::report::plot::motion;
 use crate::report::schema::{CertificatePart, FAR, InTubePart, LimitPart};
 
@@ -140,7 +140,18 @@ fn proven(inputs: &PageInputs<'_>, certificate: &CertificatePart) -> Vec<(String
         let times: Vec<String> = certificate.vias.iter().map(|via| format!("{:.1} s", via.time_s)).collect();
         out.push(("Stops".into(), escape(&format!("at rest at each via: at {}", times.join(", ")))));
     }
-    if let Some(error) = certificate.end_point_error_m {
+    if let Some(link) = &certificate.link {
+        let turned = link.angle_error_rad.map_or(String::new(), |a| format!(" and {}", degrees(a)));
+        let allowed = match link.angle_error_rad {
+            Some(_) => format!("{} and {}", mm(link.within_m), degrees(LINK_ANGLE_TOLERANCE)),
+            None => mm(link.within_m),
+        };
+        let (name, error) = (&link.name, mm(link.point_error_m));
+        out.push((
+            "End".into(),
+            escape(&format!("at rest, {name} within {error}{turned} of its place; {allowed} are allowed")),
+        ));
+    } else if let Some(error) = certificate.end_point_error_m {
         let heading = certificate.end_heading_error_rad.map_or(String::new(), |a| format!(" and {}", degrees(a)));
         let region = certificate.goal_within_m;
         let allowed = format!("{} and {}", mm(region.unwrap_or(END_POINT_TOLERANCE)), degrees(END_ANGLE_TOLERANCE));

@@ -488,3 +488,22 @@ fn figures_have_four_digits_and_proofs_round_to_the_safe_side() {
     assert_eq!([mm(0.0), mm(2e-7), mm(2.811e-6), mm(0.05)], ["0 mm", "< 0.001 mm", "0.003 mm", "50 mm"]);
     assert_eq!([grouped(12), grouped(1234), grouped(1_234_567)], ["12", "1\u{202f}234", "1\u{202f}234\u{202f}567"]);
 }
+
+#[test]
+fn a_goal_of_a_link_is_told_by_the_link_and_not_by_where_the_base_stands() {
+    let mut case = Case::new("reach", "j", 4, 0.01);
+    let certificate = case.report.certificate.as_mut().expect("judged");
+    certificate.goal_within_m = Some(1.4);
+    certificate.link = Some(crate::report::schema::LinkPart {
+        name: "<hand>".into(),
+        point_error_m: 0.0021,
+        within_m: 0.01,
+        angle_error_rad: Some(0.002),
+    });
+    let told = crate::report::summary::goal_text(certificate).expect("told").replace('\u{a0}', " ");
+    assert_eq!(told, "missed by 2.1 mm and 0.1146° by link <hand>; allowed: 10 mm and 1°");
+    let page = case.page().replace('\u{a0}', " ");
+    let tile = "<dt>Off the goal</dt><dd>2.1 mm <small>of link &lt;hand&gt;, and 0.1146° of its turn</small></dd>";
+    assert!(page.contains(tile) && !page.contains("the goal's middle"), "{page}");
+    assert!(page.contains("at rest, &lt;hand&gt; within 2.1 mm and 0.1146° of its place; 10 mm and 1° are allowed"));
+}

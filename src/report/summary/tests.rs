@@ -20,6 +20,7 @@ fn certificate() -> Certificate {
             distance: 0.05231,
         }),
         tolerance: None,
+        link_end: None,
         own_links: None,
         end_point_error: 4.2e-5,
         end_point_allowed: END_POINT_TOLERANCE,
