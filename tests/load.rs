@@ -20,6 +20,11 @@ mod linux {
     const MISSIONS: usize = 60;
     /// Missions on one map.
     const ON_A_MAP: usize = 20;
+    /// Files that two workers may have open, whatever the number of missions: each writes nine at once, beside what it reads and the
+    /// build's own, 25 at most; the rest is for what a test's runner hands down.
+    const OPEN_FILES: usize = 40;
+    /// How often the build is watched anew where a busy machine left no time to look.
+    const WATCHES: usize = 5;
 
     /// How a mission must end: of each twenty on a map one ends in the post, one is bad input, and one names a map that is not there.
     fn ends(index: usize) -> &'static str {
@@ -71,13 +76,12 @@ mod linux {
         Some(Sample { done, peak, files })
     }
 
-    #[test]
-    fn neither_memory_nor_open_files_grow_with_the_number_of_missions_and_failures_disturb_nobody() {
-        let missions = std::env::var("TRAJC_LOAD").map_or(MISSIONS, |text| text.parse().expect("TRAJC_LOAD: a number"));
-        let sandbox = Sandbox::new();
-        write(&sandbox, missions);
+    /// Builds all missions from nothing, with no more open files than are allowed: one too many and a mission would fail.
+    fn watch(sandbox: &Sandbox) -> Vec<Sample> {
+        let _ = fs::remove_dir_all(sandbox.path("out"));
         let open = |name: &str| File::create(sandbox.path(name)).expect("scratch");
-        let mut child = Command::new(env!("CARGO_BIN_EXE_trajc"))
+        let mut child = Command::new("sh")
+            .args(["-c", &format!("ulimit -n {OPEN_FILES} && exec \"$@\""), "sh", env!("CARGO_BIN_EXE_trajc")])
             .args(["build", "-k", "-j", "2", "--json"])
             .current_dir(sandbox.path("."))
             .env("COLUMNS", "100")
@@ -88,25 +92,33 @@ mod linux {
             .expect("the program starts");
         let mut samples = Vec::new();
         let status = loop {
-            samples.extend(sample(&sandbox, &child));
+            samples.extend(sample(sandbox, &child));
             if let Some(status) = child.try_wait().expect("a child") {
                 break status;
             }
             std::thread::sleep(Duration::from_millis(5));
         };
         assert_eq!(status.code(), Some(2), "{}", sandbox.text("stderr"));
+        samples
+    }
 
+    #[test]
+    fn neither_memory_nor_open_files_grow_with_the_number_of_missions_and_failures_disturb_nobody() {
+        let missions = std::env::var("TRAJC_LOAD").map_or(MISSIONS, |text| text.parse().expect("TRAJC_LOAD: a number"));
+        let sandbox = Sandbox::new();
+        write(&sandbox, missions);
         // As at mission 100 of 2000; of fewer, once every kind has been seen.
         let early = if missions < 300 { ON_A_MAP } else { 100 };
-        let split = samples.iter().position(|sample| sample.done >= early).expect("seen at work");
-        let (before, after) = samples.split_at(split + 1);
-        let most = |samples: &[Sample]| samples.iter().map(|sample| sample.files).max().expect("one at least");
-        let (first, last) = (samples[split], samples[samples.len() - 1]);
-        eprintln!("{missions} missions: at {} {first:?}, at the end {last:?}", first.done);
-        eprintln!("most open files: {} until then, {} after", most(before), most(after));
-        assert!(last.done > missions * 4 / 5, "too few looks: {last:?}");
+        let watched = (0..WATCHES).find_map(|_| {
+            let samples = watch(&sandbox);
+            let first = samples.iter().copied().find(|sample| sample.done >= early)?;
+            let last = *samples.last()?;
+            eprintln!("{missions} missions: at {} {first:?}, at the end {last:?}", first.done);
+            eprintln!("most open files: {:?}", samples.iter().map(|sample| sample.files).max());
+            (first.done < 2 * early && last.done > missions * 3 / 4).then_some((first, last))
+        });
+        let (first, last) = watched.expect("a machine that leaves time to look");
         assert!(10 * last.peak <= 11 * first.peak, "memory grows: {first:?}, then {last:?}");
-        assert!(most(after) < most(before) + missions / 8, "files stay open: {first:?}, then {last:?}");
 
         let document: Value = serde_json::from_str(&sandbox.text("stdout")).expect("JSON");
         let rows = document["missions"].as_array().expect("missions");
