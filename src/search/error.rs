@@ -39,11 +39,14 @@ pub enum SearchError {
     },
     /// The base alone gets there; with what moves on it no way was found among the postures that were sampled.
     #[error(
-        "no way to the goal was found with {postures} sampled postures of the joints, which does not prove that there is none"
+        "no way to the goal was found with {postures} sampled postures of the joints, which does not prove that there is none{}",
+        too_tight(tightest.as_deref())
     )]
     Sampled {
         /// Postures in the roadmap.
         postures: usize,
+        /// Where the robot gets stuck on the way that a thinner one takes.
+        tightest: Option<Box<Tightest>>,
     },
     /// The same of a goal that is a region.
     #[error("{error}; the goal is any place within {within} m of ({x:.3}, {y:.3})")]
@@ -157,18 +160,18 @@ impl std::fmt::Display for Absence {
         let who =
             if self.expanded > 0 || reached { "the closest pose reached is" } else { "the base gets no closer than" };
         write!(f, "; {who} ({x:.2}, {y:.2}), {:.2} m from the goal", self.to_goal)?;
-        if let Some(tight) = &self.tightest {
-            let Pose2 { x, y, yaw } = tight.pose;
-            let posture = if tight.posture.is_empty() { String::new() } else { format!(", {}", list(&tight.posture)) };
-            let heading = wrap_angle(yaw).to_degrees();
-            let room = room(&tight.contact, tight.clearance);
-            write!(
-                f,
-                "; the best way is too tight at ({x:.2}, {y:.2}), heading {heading:.0} degrees{posture}: {room}"
-            )?;
-        }
-        Ok(())
+        f.write_str(&too_tight(self.tightest.as_ref()))
     }
+}
+
+/// Where the best way is too tight, as the end of a sentence.
+fn too_tight(tightest: Option<&Tightest>) -> String {
+    let Some(tight) = tightest else { return String::new() };
+    let Pose2 { x, y, yaw } = tight.pose;
+    let posture = if tight.posture.is_empty() { String::new() } else { format!(", {}", list(&tight.posture)) };
+    let heading = wrap_angle(yaw).to_degrees();
+    let room = room(&tight.contact, tight.clearance);
+    format!("; the best way is too tight at ({x:.2}, {y:.2}), heading {heading:.0} degrees{posture}: {room}")
 }
 
 /// Joints with their values, as in a mission file.
@@ -229,9 +232,12 @@ impl Describe for SearchError {
             Self::Marginal { expanded } => Diagnostic::failure("search/marginal", self)
                 .hint("lower `clearance_m` by a millimetre")
                 .number("expanded", *expanded),
-            Self::Sampled { postures } => Diagnostic::failure("search/no-posture", self)
-                .hint("free the goal's joints or heading, give joint values that keep farther from obstacles, or lower `clearance_m`")
-                .number("postures", *postures),
+            Self::Sampled { postures, tightest } => {
+                let out = Diagnostic::failure("search/no-posture", self)
+                    .hint("free the goal's joints or heading, give joint values that keep farther from obstacles, or lower `clearance_m`")
+                    .number("postures", *postures);
+                with_tightest(out, tightest.as_deref())
+            }
             Self::OfRegion { error, within, .. } => {
                 let mut out = error.diagnostic().number("goal_within_m", *within);
                 out.message = self.to_string();
@@ -294,18 +300,19 @@ impl SearchError {
                 .number("narrowest_gap_y_m", *y)
                 .number("least_gap_needed_m", 2.0 * core);
         }
-        if let Some(tight) = tightest {
-            out = out
-                .number("tightest_x_m", tight.pose.x)
-                .number("tightest_y_m", tight.pose.y)
-                .number("tightest_yaw_rad", wrap_angle(tight.pose.yaw))
-                .number("tightest_posture", values(&tight.posture))
-                .number("tightest_link", tight.contact.link.clone())
-                .number("tightest_clearance_m", tight.contact.clearance)
-                .number("missing_m", tight.missing());
-        }
-        out
+        with_tightest(out, tightest.as_ref())
     }
+}
+
+fn with_tightest(out: Diagnostic, tightest: Option<&Tightest>) -> Diagnostic {
+    let Some(tight) = tightest else { return out };
+    out.number("tightest_x_m", tight.pose.x)
+        .number("tightest_y_m", tight.pose.y)
+        .number("tightest_yaw_rad", wrap_angle(tight.pose.yaw))
+        .number("tightest_posture", values(&tight.posture))
+        .number("tightest_link", tight.contact.link.clone())
+        .number("tightest_clearance_m", tight.contact.clearance)
+        .number("missing_m", tight.missing())
 }
 
 /// Joints with their values, for report.json.

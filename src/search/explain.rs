@@ -73,13 +73,16 @@ pub(super) fn not_found<const W: usize>(solver: &Solver<'_, W>) -> SearchError {
     base.bodies.iter_mut().for_each(|body| body.motion = None);
     let query = Query { start_joints: Vec::new(), goal_joints: Vec::new(), ..query.clone() };
     let problem = Problem { robot: &base, query: &query, ..solver.problem };
-    let sampled = SearchError::Sampled { postures: solver.collider.postures.count() };
-    let Ok(alone) = Solver::<1>::new(problem, Postures::new(&base, &query, 0)) else { return sampled };
+    let sampled = || SearchError::Sampled {
+        postures: solver.collider.postures.count(),
+        tightest: tightest(solver).map(Box::new),
+    };
+    let Ok(alone) = Solver::<1>::new(problem, Postures::new(&base, &query, 0)) else { return sampled() };
     match alone.guided().map_or_else(|| alone.on_the_lattice(MOST_LABELS_ALONE), |guided| Ok(guided.path)) {
         Err(NoPath::Exhausted { core_clearances, closest, expanded }) => {
             absent(&alone, &core_clearances, closest, expanded)
         }
-        _ => sampled,
+        _ => sampled(),
     }
 }
 
@@ -221,8 +224,12 @@ fn way_with_less<const W: usize>(solver: &Solver<'_, W>, less: f64) -> Option<Se
     options.clearance = (options.clearance - less).max(0.0);
     let robot = thinner(problem.robot, less - problem.options.clearance);
     let problem = Problem { robot: &robot, options: &options, ..problem };
+    let exhaustive = solver.collider.postures.is_exhaustive();
     let solver = Solver::<W>::new(problem, solver.collider.postures.clone()).ok()?;
-    solver.guided().map(|guided| guided.path).or_else(|| solver.on_the_lattice(QUICK).ok())
+    let guided = solver.guided().map(|guided| guided.path);
+    // With a roadmap that takes seconds.
+    let lattice = || if exhaustive { solver.on_the_lattice(QUICK).ok() } else { None };
+    guided.or_else(lattice)
 }
 
 /// The robot with every shape's surface so much farther in, m; for hulls about so much.

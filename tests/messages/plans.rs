@@ -40,6 +40,12 @@ pub fn cases() -> Vec<Case> {
                 s.write("maps/first.csv", s.text("maps/first.csv") + &wall);
             })
             .exit(1).at(MISSION, "goal").found("closed off").expected("no way").hint("look at the map"),
+        // A beam that the base passes under, and the arm does not.
+        case("no_posture").edit(MISSION, "box_base", "arm4").edit(MISSION, START, "x_m: 0.6, y_m: 1.5, yaw: 0").with(|s| {
+                let beam: String = (0..60).map(|i| format!("2.025,{},0.325\n", 0.05 * f64::from(i) + 0.025)).collect();
+                s.write("maps/first.csv", "x_m,y_m,z_m\n0.025,0.025,0\n3.975,2.975,0.925\n".to_owned() + &beam);
+            })
+            .exit(1).at(MISSION, "goal").found("does not prove that there is none").expected("are missing").hint("free the goal's joints"),
         blades("joint_near", "x_m: 0.6, y_m: 1.5, yaw: 0, joints: {blad: 0.0}").at(MISSION, "blad:").found("`blad`")
             .expected("moving joint of `scr_db`").hint("did you mean `blade`?"),
         blades("joint_range", "x_m: 0.6, y_m: 1.5, yaw: 0, joints: {blade: 270deg}").at(MISSION, "|blade: 270deg").found("4.712")
