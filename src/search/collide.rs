@@ -1,10 +1,13 @@
 //! Which postures are free along a motion of the base: exact, from the occupied cells' cubes; the distance field only says
 //! early that everything near is free, or that something is not.
 
+mod contact;
+mod still;
+
 use std::cell::{Cell, OnceCell, RefCell};
 use std::collections::BTreeMap;
 
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use super::bits::Bits;
 use super::obstacles;
@@ -17,6 +20,7 @@ use crate::math::gjk;
 use crate::math::real;
 use crate::mission::Unknown;
 use crate::robot::RobotModel;
+pub use contact::Contact;
 
 /// A motion of the base: a straight drive (equal headings) or a spin (equal positions) of at most a right angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,6 +33,12 @@ impl BaseMotion {
     fn middle(&self) -> Pose2 {
         let mean = |a: f64, b: f64| 0.5 * (a + b);
         Pose2::new(mean(self.from.x, self.to.x), mean(self.from.y, self.to.y), mean(self.from.yaw, self.to.yaw))
+    }
+
+    /// The pose so far along.
+    pub fn at(&self, share: f64) -> Pose2 {
+        let mix = |a: f64, b: f64| a + share * (b - a);
+        Pose2::new(mix(self.from.x, self.to.x), mix(self.from.y, self.to.y), mix(self.from.yaw, self.to.yaw))
     }
 
     /// The poses at the middles of equal parts.
@@ -108,17 +118,6 @@ struct Near {
     hint: Cell<Vector3<f64>>,
 }
 
-/// The nearest obstacle of a pose, for people.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Contact {
-    /// URDF link.
-    pub link: String,
-    /// The obstacle; `None`: unseen space beyond the map.
-    pub obstacle: Option<Aabb>,
-    /// Clearance, m; negative: least overlap found over many directions.
-    pub clearance: f64,
-}
-
 /// Exact collision queries for one robot in one map.
 pub(super) struct Collider<'a, const W: usize> {
     robot: &'a RobotModel,
@@ -151,7 +150,7 @@ impl<'a, const W: usize> Collider<'a, W> {
         let places: Vec<_> = (0..postures.count()).map(|p| robot.shape_poses(postures.joints(p))).collect();
         let neighbours = Neighbours::new(&postures);
         for (s, shape) in robot.shapes.iter().enumerate() {
-            let place = |p: &Vec<nalgebra::Isometry3<f64>>| Posed::new(&p[s]);
+            let place = |p: &Vec<Isometry3<f64>>| Posed::new(&p[s]);
             if robot.is_moved(shape.body) {
                 let poses: Vec<Posed> = places.iter().map(place).collect();
                 moving.push(Placed::new(s, &shape.convex, poses, &postures));
@@ -256,30 +255,6 @@ impl<'a, const W: usize> Collider<'a, W> {
             }
         }
         free
-    }
-
-    /// Tells of any posture whether the moving shapes are clear and no links touch, the base standing.
-    pub fn standing(&self, pose: Pose2) -> impl Fn(&[f64]) -> bool + '_ {
-        // Other postures may reach farther than those that were sampled.
-        const FARTHER: f64 = 0.5;
-        let base: Base = pose.into();
-        let mut region = self.region([pose.x, pose.y], [pose.x, pose.y], self.reach + self.clearance + FARTHER);
-        (region.min[2], region.max[2]) = (region.min[2] - FARTHER, region.max[2] + FARTHER);
-        let mut boxes = Vec::new();
-        obstacles::collect(self.map, &region, &mut boxes);
-        let near = Near { boxes, hint: Cell::new(Vector3::x()) };
-        let pairs = self.robot.self_pairs();
-        move |joints| {
-            let poses = self.robot.shape_poses(joints);
-            let clear = |placed: &Placed| {
-                let own = Posed::new(&poses[placed.shape]);
-                let far = self.esdf.distance(base.map(&own.centre)) - TOO_HIGH * self.map.resolution - placed.radius;
-                let end = own.under(&base);
-                let sweep = Sweep { ends: [end, end], bulge: 0.0 };
-                far >= self.clearance || self.exact_gap(placed, &sweep, &near, self.clearance).lower >= self.clearance
-            };
-            self.moving.iter().all(clear) && self.robot.touching(&pairs, joints).is_none()
-        }
     }
 
     /// What moving shapes take up in every posture that is searched: balls in them that no joint moves.
@@ -522,58 +497,6 @@ impl<'a, const W: usize> Collider<'a, W> {
         }
         gap
     }
-
-    /// The nearest obstacle of a pose in one posture, exactly.
-    pub fn contact(&self, pose: Pose2, joints: &[f64]) -> Contact {
-        let reach = self.reach + 1.0;
-        let region = Aabb {
-            min: [pose.x - reach, pose.y - reach, self.heights[0] - 1.0],
-            max: [pose.x + reach, pose.y + reach, self.heights[1] + 1.0],
-        };
-        let mut boxes = Vec::new();
-        obstacles::collect(self.map, &region, &mut boxes);
-        let mut best = Contact { link: self.robot.name.clone(), obstacle: None, clearance: f64::INFINITY };
-        for (shape, place) in self.robot.shapes.iter().zip(self.robot.shape_poses(joints)) {
-            let posed = Posed::new(&place).under(&pose.into());
-            let mut take = |clearance: f64, obstacle: Option<Aabb>| {
-                if clearance < best.clearance {
-                    best = Contact { link: shape.link.clone(), obstacle, clearance };
-                }
-            };
-            if self.map.outside == Unknown::Occupied {
-                take(edge_distance(&self.map.bounds(), &posed.bounds(&shape.convex)), None);
-            }
-            for obstacle in &boxes {
-                let apart = |d: &Vector3<f64>| {
-                    posed.support(&shape.convex, d)
-                        - Vector3::from_fn(|i, _| if d[i] > 0.0 { obstacle.min[i] } else { obstacle.max[i] })
-                };
-                let middle = Vector3::from_fn(|i, _| 0.5 * (obstacle.min[i] + obstacle.max[i]));
-                let precise = |gap: gjk::Gap| gap.upper - gap.lower <= 1e-6;
-                let gap = gjk::distance_from_origin(apart, posed.centre - middle, precise);
-                let clearance = if gap.upper > 0.0 { gap.upper } else { -overlap(apart, &posed.rotation) };
-                take(clearance, Some(*obstacle));
-            }
-        }
-        best
-    }
-}
-
-/// Least overlap of two bodies over many directions: how far one must move to leave the other (an upper bound), m.
-fn overlap(apart: impl Fn(&Vector3<f64>) -> Vector3<f64>, rotation: &Matrix3<f64>) -> f64 {
-    let spread = (0..200).map(|k| {
-        // Fibonacci's spiral spreads directions evenly over the sphere.
-        let z = 1.0 - (2.0 * f64::from(k) + 1.0) / 200.0;
-        let angle = f64::from(k) * std::f64::consts::PI * (1.0 + 5f64.sqrt());
-        let flat = (1.0 - z * z).sqrt();
-        Vector3::new(flat * real::cos(angle), flat * real::sin(angle), z)
-    });
-    let axes = (0..3).flat_map(|i| {
-        let own: Vector3<f64> = rotation.column(i).into();
-        let world = Vector3::ith(i, 1.0);
-        [own, -own, world, -world]
-    });
-    spread.chain(axes).map(|d| apart(&d).dot(&d)).fold(f64::INFINITY, f64::min)
 }
 
 fn sweep_bounds(placed: &Placed, sweep: &Sweep) -> Aabb {

@@ -9,10 +9,13 @@ const STEP_TIME: f64 = 0.06;
 /// Postures that are looked at before it gives up.
 const MOST_LOOKS: usize = 6_000;
 
-/// Postures, and which of them are free.
-pub(super) struct Escape<F: FnMut(&[f64]) -> bool> {
+/// How often a way is straightened.
+const STRAIGHTENED: usize = 3;
+
+/// Postures, and which straight ways between them are free, but for where they begin.
+pub(super) struct Escape<F: FnMut(&[f64], &[f64]) -> bool> {
     space: JointSpace,
-    free: F,
+    passes: F,
     looks: usize,
 }
 
@@ -41,10 +44,10 @@ impl Tree {
     }
 }
 
-impl<F: FnMut(&[f64]) -> bool> Escape<F> {
+impl<F: FnMut(&[f64], &[f64]) -> bool> Escape<F> {
     /// `near`: values about which endless joints are sampled.
-    pub fn new(robot: &RobotModel, near: &[f64], free: F) -> Self {
-        Self { space: JointSpace::new(robot, near), free, looks: 0 }
+    pub fn new(robot: &RobotModel, near: &[f64], passes: F) -> Self {
+        Self { space: JointSpace::new(robot, near), passes, looks: 0 }
     }
 
     /// Postures from `from` to one of `to`, both among them, no farther apart than a step; `None`: none found. All given ones are free.
@@ -70,16 +73,16 @@ impl<F: FnMut(&[f64]) -> bool> Escape<F> {
                     let mut way = trees[0].back(ends[0]);
                     way.reverse();
                     way.extend(trees[1].back(ends[1]).into_iter().skip(1));
-                    return Some(self.straightened(way));
+                    return Some((0..STRAIGHTENED).fold(way, |way, _| self.straightened(&way)));
                 }
             }
         }
         None
     }
 
-    fn is_free(&mut self, posture: &[f64]) -> bool {
+    fn passes(&mut self, from: &[f64], to: &[f64]) -> bool {
         self.looks += 1;
-        (self.free)(posture)
+        (self.passes)(from, to)
     }
 
     /// Up to `most` steps from the nearest posture of a tree towards another; the last one made, and whether it is there.
@@ -96,7 +99,7 @@ impl<F: FnMut(&[f64]) -> bool> Escape<F> {
             }
             let share = (STEP_TIME / left).min(1.0);
             let next = between(&tree.postures[at], target, share);
-            if self.looks > MOST_LOOKS || !self.is_free(&next) {
+            if self.looks > MOST_LOOKS || !self.passes(&tree.postures[at], &next) {
                 return (made, false);
             }
             at = tree.add(next, Some(at));
@@ -106,15 +109,14 @@ impl<F: FnMut(&[f64]) -> bool> Escape<F> {
     }
 
     /// The way with straight pieces where those are free, sampled anew.
-    fn straightened(&mut self, way: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    fn straightened(&mut self, way: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let mut out = vec![way[0].clone()];
         let mut at = 0;
         while at + 1 < way.len() {
             let mut ahead = way.len() - 1 - at;
             let piece = loop {
-                let piece = self.sampled(&way[at], &way[at + ahead]);
-                if ahead == 1 || piece.iter().all(|posture| self.is_free(posture)) {
-                    break piece;
+                if ahead == 1 || self.passes(&way[at], &way[at + ahead]) {
+                    break self.sampled(&way[at], &way[at + ahead]);
                 }
                 ahead = ahead.div_ceil(2).min(ahead - 1);
             };
@@ -148,16 +150,20 @@ mod tests {
         !(0.45..0.55).contains(&q[0]) || opening.contains(&q[1])
     }
 
+    fn passes(a: &[f64], b: &[f64], opening: std::ops::Range<f64>) -> bool {
+        (1..=50).all(|k| wall(&between(a, b, f64::from(k) / 50.0), opening.clone()))
+    }
+
     #[test]
     fn a_way_leads_through_the_only_opening_in_steps_that_are_free() {
         let robot = robot();
-        let mut escape = Escape::new(&robot, &[0.0; 2], |q| wall(q, 0.8..0.95));
+        let mut escape = Escape::new(&robot, &[0.0; 2], |a, b| passes(a, b, 0.8..0.95));
         let to = [vec![0.9, 0.1], vec![0.95, 0.2]];
         let way = escape.way(&[0.1, 0.1], &to).expect("there is one");
         assert_eq!(way[0], [0.1, 0.1]);
         assert!(to.contains(&way[way.len() - 1]));
         for pair in way.windows(2) {
-            assert!(pair.iter().all(|q| wall(q, 0.8..0.95)), "{pair:?}");
+            assert!(passes(&pair[0], &pair[1], 0.8..0.95), "{pair:?}");
             assert!(escape.space.time(&pair[0], &pair[1]) <= STEP_TIME + 1e-9, "{pair:?}");
         }
     }
@@ -165,7 +171,10 @@ mod tests {
     #[test]
     fn it_gives_up_where_there_is_none() {
         let robot = robot();
-        assert_eq!(Escape::new(&robot, &[0.0; 2], |q| wall(q, 2.0..3.0)).way(&[0.1, 0.1], &[vec![0.9, 0.1]]), None);
-        assert_eq!(Escape::new(&robot, &[0.0; 2], |_| true).way(&[0.1, 0.1], &[]), None);
+        assert_eq!(
+            Escape::new(&robot, &[0.0; 2], |a, b| passes(a, b, 2.0..3.0)).way(&[0.1, 0.1], &[vec![0.9, 0.1]]),
+            None
+        );
+        assert_eq!(Escape::new(&robot, &[0.0; 2], |_, _| true).way(&[0.1, 0.1], &[]), None);
     }
 }

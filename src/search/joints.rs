@@ -14,21 +14,23 @@ const CLOSE: [u32; 3] = [12, 6, 3];
 
 const UNREACHED: u32 = u32::MAX / 2;
 
-/// One posture before each piece and one after the last, so `masks.len() + 1`; `None` where none gets through.
+/// The postures that each piece passes, step by step, from the last one of the piece before; `None` where none gets through.
 ///
 /// `masks`: free postures of each piece; a change during a piece passes only through its free postures. `rates`: steps that
-/// there is time for in each piece. `brinks`: postures at the ends of the ranges of joints that need not be there.
+/// there is time for in each piece. `shut`: steps that are not taken in a piece. `brinks`: postures at the ends of the ranges of joints that need not be there.
 pub(super) fn choose<const W: usize>(
     neighbours: &Neighbours<W>,
     count: usize,
     masks: &[Bits<W>],
     rates: &[usize],
+    shut: impl Fn(usize, usize, usize) -> bool,
     [start, goal]: [Bits<W>; 2],
     brinks: Bits<W>,
-) -> Option<Vec<usize>> {
+) -> Option<Vec<Vec<usize>>> {
     let mut cost: Vec<u32> = (0..count).map(|p| if start.contains(p) { 0 } else { UNREACHED }).collect();
     let mut came_from: Vec<Vec<u32>> = Vec::with_capacity(masks.len());
-    for (mask, rate) in masks.iter().zip(rates) {
+    for (piece, (mask, rate)) in masks.iter().zip(rates).enumerate() {
+        let shut = |p, q| shut(piece, p, q);
         let mut from: Vec<u32> = (0..count as u32).collect();
         for (p, cost) in cost.iter_mut().enumerate() {
             if !mask.contains(p) {
@@ -36,11 +38,11 @@ pub(super) fn choose<const W: usize>(
             }
         }
         for _ in 0..*rate {
-            if !relax(neighbours, *mask, STEP, &mut cost, &mut from) {
+            if !relax(neighbours, *mask, shut, STEP, &mut cost, &mut from) {
                 break;
             }
         }
-        while relax(neighbours, *mask, WAIT, &mut cost, &mut from) {}
+        while relax(neighbours, *mask, shut, WAIT, &mut cost, &mut from) {}
         let mut near = *mask;
         for (k, close) in CLOSE.into_iter().enumerate() {
             // Postures that have a neighbour outside: not in the mask's interior.
@@ -52,32 +54,38 @@ pub(super) fn choose<const W: usize>(
         came_from.push(from);
     }
     let last = goal.iter().filter(|p| cost[*p] < UNREACHED).min_by_key(|p| cost[*p])?;
-    let mut path = vec![last];
     let mut at = last;
+    let mut passed = Vec::with_capacity(masks.len());
     for from in came_from.iter().rev() {
-        at = from[at] as usize;
-        path.push(at);
+        let mut steps = vec![at];
+        // Each step led to where it is cheaper to be, so none leads back.
+        while from[at] as usize != at {
+            at = from[at] as usize;
+            steps.push(at);
+        }
+        steps.reverse();
+        passed.push(steps);
     }
-    path.reverse();
-    Some(path)
+    passed.reverse();
+    Some(passed)
 }
 
-/// One step in every direction at once; whether anything got cheaper.
+/// One step in every direction at once, and where it came from; whether anything got cheaper.
 fn relax<const W: usize>(
     neighbours: &Neighbours<W>,
     mask: Bits<W>,
+    shut: impl Fn(usize, usize) -> bool,
     step: u32,
     cost: &mut [u32],
     from: &mut [u32],
 ) -> bool {
     let before = cost.to_vec();
-    let origin = from.to_vec();
     let mut changed = false;
     for p in mask.iter() {
         neighbours.each(p, |q| {
-            if before[q] < UNREACHED && before[q] + step < cost[p] {
+            if before[q] < UNREACHED && before[q] + step < cost[p] && !shut(p, q) {
                 cost[p] = before[q] + step;
-                from[p] = origin[q];
+                from[p] = q as u32;
                 changed = true;
             }
         });
@@ -140,10 +148,25 @@ mod tests {
         Neighbours::new(&super::super::posture::Postures::new(&robot, &query, 0))
     }
 
+    /// Where each piece begins, and the last one ends.
+    fn between(passed: &[Vec<usize>]) -> Vec<usize> {
+        let first = passed[0][0];
+        std::iter::once(first).chain(passed.iter().map(|steps| steps[steps.len() - 1])).collect()
+    }
+
     #[test]
     fn a_change_is_spread_over_the_pieces_that_have_time_for_it() {
         let masks = [line(0..64), line(0..64), line(0..64), line(30..64)];
-        let path = choose(&one_joint(), 64, &masks, &[12; 4], [line(0..1), line(0..64)], Bits::EMPTY).expect("a way");
+        let path = choose(&one_joint(), 64, &masks, &[12; 4], |_, _, _| false, [line(0..1), line(0..64)], Bits::EMPTY)
+            .expect("a way");
+        for pair in path.windows(2) {
+            assert_eq!(pair[0].last(), pair[1].first());
+        }
+        for (steps, mask) in path.iter().zip(&masks) {
+            assert!(steps.windows(2).all(|pair| pair[0].abs_diff(pair[1]) == 1), "{path:?}");
+            assert!(steps.iter().all(|p| mask.contains(*p)), "{path:?}");
+        }
+        let path = between(&path);
         assert_eq!(path.len(), 5);
         for (k, pair) in path.windows(2).enumerate() {
             assert!(pair[0].abs_diff(pair[1]) <= 12, "piece {k}: {path:?}");
@@ -155,7 +178,9 @@ mod tests {
     fn a_joint_that_may_start_anywhere_keeps_off_the_ends_of_its_range() {
         let brinks = line(0..1).or(line(63..64));
         let free = |start, brinks| {
-            choose(&one_joint(), 64, &[line(0..64); 5], &[64; 5], [start, line(0..64)], brinks).expect("a way")
+            let path =
+                choose(&one_joint(), 64, &[line(0..64); 5], &[64; 5], |_, _, _| false, [start, line(0..64)], brinks);
+            between(&path.expect("a way"))
         };
         let path = free(line(0..64), brinks);
         assert!(path.iter().all(|p| (3..61).contains(p) && *p == path[0]), "{path:?}");
@@ -167,10 +192,33 @@ mod tests {
     fn a_gap_in_the_free_postures_is_not_jumped() {
         let mut split = line(0..20);
         split = split.or(line(30..64));
-        assert!(choose(&one_joint(), 64, &[split], &[64], [line(0..1), line(40..41)], Bits::EMPTY).is_none());
         assert!(
-            choose(&one_joint(), 64, &[split, line(0..64)], &[64, 64], [line(0..1), line(40..41)], Bits::EMPTY)
-                .is_some()
+            choose(&one_joint(), 64, &[split], &[64], |_, _, _| false, [line(0..1), line(40..41)], Bits::EMPTY)
+                .is_none()
         );
+        assert!(
+            choose(
+                &one_joint(),
+                64,
+                &[split, line(0..64)],
+                &[64, 64],
+                |_, _, _| false,
+                [line(0..1), line(40..41)],
+                Bits::EMPTY
+            )
+            .is_some()
+        );
+    }
+
+    #[test]
+    fn a_step_that_is_shut_in_a_piece_is_taken_in_another_or_not_at_all() {
+        let masks = [line(0..64); 3];
+        let path = |shut: &dyn Fn(usize) -> bool| {
+            let shut = |piece, p: usize, q: usize| shut(piece) && p.min(q) == 20;
+            choose(&one_joint(), 64, &masks, &[64; 3], shut, [line(10..11), line(30..31)], Bits::EMPTY)
+        };
+        let passed = path(&|piece| piece != 1).expect("in the second");
+        assert_eq!(passed[1].windows(2).filter(|pair| pair[0].min(pair[1]) == 20).count(), 1, "{passed:?}");
+        assert!(path(&|_| true).is_none());
     }
 }

@@ -15,6 +15,7 @@ mod explain;
 mod guide;
 mod headed;
 mod heuristic;
+mod joined;
 mod joint_space;
 mod joints;
 mod lattice;

@@ -4,6 +4,8 @@
 //! fine enough: theirs is a roadmap (`roadmap`), some postures and the straight ways between them, sampled as finely. No joint is one
 //! posture. All other code asks for neighbours and sets of postures (`Bits<W>`) and knows no number of joints.
 
+use std::collections::{BTreeMap, VecDeque};
+
 use super::Query;
 use super::bits::Bits;
 use super::roadmap;
@@ -110,21 +112,60 @@ impl Postures {
         matches!(self.steps, Steps::Grid { .. })
     }
 
-    /// Ends from which no folded or spread posture is reached among the free ones, and those of them that are free.
-    pub fn shut_in<const W: usize>(
+    /// How an end's postures lead to a folded or spread one by steps within `free` that pass, in few steps. `None`: of a grid, and where
+    /// no posture of that end is free, there is nothing to tell.
+    pub fn way_out<const W: usize>(
         &self,
         neighbours: &Neighbours<W>,
         end: End,
         free: Bits<W>,
-    ) -> Option<(usize, Vec<usize>)> {
+        passes: impl Fn(&[f64], &[f64]) -> bool,
+    ) -> Option<WayOut> {
         let Steps::Roadmap(roadmap) = &self.steps else { return None };
-        let mut wanted = Bits::EMPTY;
-        (0..roadmap.keys).for_each(|key| wanted.insert(key));
-        let mut set = Bits::EMPTY;
-        roadmap.ends[end as usize].iter().for_each(|p| set.insert(*p as usize));
-        let from = set.and(free).iter().next()?;
-        let out = neighbours.flood(set, free).and(wanted);
-        out.is_empty().then(|| (from, wanted.and(free).iter().collect()))
+        let keys: Vec<usize> = (0..roadmap.keys).filter(|key| free.contains(*key)).collect();
+        let ends = roadmap.ends[end as usize].iter().map(|p| *p as usize);
+        let ends: Vec<usize> = ends.filter(|p| free.contains(*p)).collect();
+        let from = *ends.first()?;
+        let mut open = BTreeMap::new();
+        loop {
+            // In breadth, so that few steps are looked at closely.
+            let mut came = vec![usize::MAX; self.count()];
+            let mut queue: VecDeque<usize> = ends.iter().copied().collect();
+            ends.iter().for_each(|p| came[*p] = *p);
+            while let Some(p) = queue.pop_front() {
+                neighbours.each(p, |q| {
+                    if came[q] == usize::MAX && free.contains(q) && open.get(&[p.min(q), p.max(q)]) != Some(&false) {
+                        came[q] = p;
+                        queue.push_back(q);
+                    }
+                });
+            }
+            let Some(mut at) = keys.iter().copied().find(|key| came[*key] != usize::MAX) else {
+                return Some(WayOut { blocked: blocked(&open), shut_in: Some((from, keys)) });
+            };
+            let mut passed = true;
+            while came[at] != at {
+                let last = came[at];
+                let step = [last.min(at), last.max(at)];
+                passed &= *open.entry(step).or_insert_with(|| passes(&self.values[step[0]], &self.values[step[1]]));
+                at = last;
+            }
+            if passed {
+                return Some(WayOut { blocked: blocked(&open), shut_in: None });
+            }
+        }
+    }
+
+    /// Without these steps.
+    pub fn without(&self, steps: &[[usize; 2]]) -> Self {
+        let mut fewer = self.clone();
+        if let Steps::Roadmap(roadmap) = &mut fewer.steps {
+            for [a, b] in steps {
+                roadmap.neighbours[*a].retain(|p| *p as usize != *b);
+                roadmap.neighbours[*b].retain(|p| *p as usize != *a);
+            }
+        }
+        fewer
     }
 
     /// With a way of postures, the first and last of which are in it already; of the others so many at most.
@@ -133,12 +174,10 @@ impl Postures {
         let known = |posture: &Vec<f64>| self.values.iter().position(|own| own == posture);
         let Steps::Roadmap(roadmap) = &mut more.steps else { return more };
         let (Some(from), Some(to)) = (known(&way[0]), known(&way[way.len() - 1])) else { return more };
-        let inner = &way[1..way.len() - 1];
-        let every = (inner.len() as f64 / room.max(1) as f64).ceil().max(2.0) as usize;
         let mut last = from as u32;
-        for posture in inner.iter().skip(every - 1).step_by(every) {
+        for posture in thinned(way, room) {
             let next = more.values.len() as u32;
-            more.values.push(posture.clone());
+            more.values.push(posture);
             roadmap.neighbours.push(vec![last]);
             roadmap.neighbours[last as usize].push(next);
             last = next;
@@ -292,6 +331,48 @@ impl<const W: usize> Neighbours<W> {
     }
 }
 
+/// How an end's postures lead out.
+pub(super) struct WayOut {
+    /// Steps of the roadmap that do not pass.
+    pub blocked: Vec<[usize; 2]>,
+    /// A posture of the end from which no way leads out, and those that it should lead to.
+    pub shut_in: Option<(usize, Vec<usize>)>,
+}
+
+fn blocked(open: &BTreeMap<[usize; 2], bool>) -> Vec<[usize; 2]> {
+    open.iter().filter(|(_, open)| !**open).map(|(step, _)| *step).collect()
+}
+
+/// Postures of a way without its ends: its corners, and between them every other one or fewer, so that there are no more than `most`. Where
+/// there are more corners than that, so many of all.
+fn thinned(way: &[Vec<f64>], most: usize) -> Vec<Vec<f64>> {
+    let inner = way.len() - 2;
+    let mut corners = vec![0];
+    corners.extend((1..=inner).filter(|k| !straight(&way[k - 1], &way[*k], &way[k + 1])));
+    corners.push(way.len() - 1);
+    for every in 2..=inner.max(2) {
+        let mut kept = Vec::new();
+        for pair in corners.windows(2) {
+            let (from, steps) = (pair[0], pair[1] - pair[0]);
+            let parts = steps.div_ceil(every);
+            kept.extend((1..=parts).map(|part| from + steps * part / parts));
+        }
+        kept.pop();
+        if kept.len() <= most {
+            return kept.into_iter().map(|k| way[k].clone()).collect();
+        }
+    }
+    let every = inner.div_ceil(most.max(1)).max(2);
+    (1..=inner).skip(every - 1).step_by(every).map(|k| way[k].clone()).collect()
+}
+
+/// Whether the steps from `a` by `b` to `c` go the same way.
+pub(super) fn straight(a: &[f64], b: &[f64], c: &[f64]) -> bool {
+    let norm = |p: &[f64], q: &[f64]| p.iter().zip(q).map(|(p, q)| (q - p) * (q - p)).sum::<f64>().sqrt();
+    // The detour by b.
+    norm(a, b) + norm(b, c) - norm(a, c) < 1e-9
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -346,6 +427,77 @@ mod tests {
                 assert_eq!(grid.agrees(q, End::Goal, &asked), p == q);
             }
             assert!(grid.agrees(p, End::Start, &[None; 3]));
+        }
+    }
+
+    /// Postures in a row, of one joint that is its number, with a key at the far end and a short cut there from the second one.
+    fn row(count: usize) -> Postures {
+        let last = count - 1;
+        // Keys come first: the far end is posture 0.
+        let number = |p: usize| if p == 0 { last } else { p - 1 };
+        let posture = |number: usize| if number == last { 0 } else { number + 1 };
+        let of = |p: usize| {
+            let at = number(p);
+            let beside = [at.checked_sub(1), Some(at + 1)].into_iter().flatten().filter(|n| *n <= last);
+            let short_cut = [(1, last), (last, 1)].into_iter().filter(|(from, _)| *from == at).map(|(_, to)| to);
+            let mut own: Vec<u32> = beside.chain(short_cut).map(|n| posture(n) as u32).collect();
+            own.sort_unstable();
+            own
+        };
+        let neighbours = (0..count).map(of).collect();
+        let ends = [vec![posture(0) as u32], vec![]];
+        let roadmap = Roadmap { neighbours, step_time: 1.0, ends, keys: 1 };
+        Postures { values: (0..count).map(|p| vec![number(p) as f64]).collect(), steps: Steps::Roadmap(roadmap) }
+    }
+
+    #[test]
+    fn a_way_out_leads_round_steps_that_do_not_pass_and_tells_where_none_is_left() {
+        let row = row(8);
+        let neighbours = Neighbours::<1>::new(&row);
+        let out = |free: Bits<1>, passes: &dyn Fn(f64, f64) -> bool| {
+            row.way_out(&neighbours, End::Start, free, |a, b| passes(a[0].min(b[0]), a[0].max(b[0])))
+                .expect("an end that is free")
+        };
+        let all = Bits::all(8);
+        let way = out(all, &|_, _| true);
+        assert!(way.blocked.is_empty() && way.shut_in.is_none());
+        // The short cut is shut: on along the row.
+        let way = out(all, &|a, b| b - a < 2.0);
+        assert_eq!(way.blocked, [[0, 2]]);
+        assert!(way.shut_in.is_none());
+        let fewer = row.without(&way.blocked);
+        let mut left = Bits::<1>::EMPTY;
+        Neighbours::<1>::new(&fewer).each(0, |p| left.insert(p));
+        assert_eq!(left.iter().collect::<Vec<_>>(), [7]);
+        let way = out(all, &|a, b| b - a < 2.0 && a != 4.0);
+        assert_eq!(way.blocked, [[0, 2], [5, 6]]);
+        assert_eq!(way.shut_in, Some((1, vec![0])));
+        let mut none = all;
+        none.remove(1);
+        assert!(row.way_out(&neighbours, End::Start, none, |_, _| true).is_none());
+    }
+
+    proptest! {
+        #[test]
+        fn of_a_way_its_corners_stay_and_no_more_postures_than_there_is_room_for(
+            turns in prop::collection::vec((1usize..9, -3i32..4), 1..8), room in 1usize..60,
+        ) {
+            let mut way = vec![vec![0.0, 0.0]];
+            for (steps, slope) in &turns {
+                for _ in 0..*steps {
+                    let last = way[way.len() - 1].clone();
+                    way.push(vec![last[0] + 1.0, last[1] + f64::from(*slope)]);
+                }
+            }
+            prop_assume!(way.len() > 2);
+            let kept = thinned(&way, room);
+            prop_assert!(kept.len() <= room);
+            prop_assert!(kept.windows(2).all(|pair| pair[0][0] < pair[1][0]));
+            let corners: Vec<&Vec<f64>> =
+                way.windows(3).filter(|w| w[1][1] - w[0][1] != w[2][1] - w[1][1]).map(|w| &w[1]).collect();
+            if corners.len() <= room {
+                prop_assert!(corners.iter().all(|corner| kept.contains(corner)), "{:?} {:?}", corners, kept);
+            }
         }
     }
 }

@@ -7,15 +7,15 @@ use super::escape::Escape;
 use super::guide::{self, Fits, Guide};
 use super::headed::{self, Headed};
 use super::heuristic::{self, Core, CostToGo};
-use super::joints;
+use super::joined::with_joints;
 use super::lattice::{self, Lattice};
-use super::posture::Postures;
+use super::posture::{Postures, WayOut};
 use super::route::{Grain, Route};
-use super::shortcut::{CheckedRoute, Shortcutter};
+use super::shortcut::Shortcutter;
 use super::upright::Upright;
-use super::{Query, SearchMove, SearchOptions, SearchPath, SearchState, region};
+use super::{Query, SearchOptions, SearchPath, region};
 use crate::esdf::Esdf;
-use crate::geom::{Pose2, wrap_angle};
+use crate::geom::Pose2;
 use crate::map::VoxelMap;
 use crate::math::real;
 use crate::robot::RobotModel;
@@ -386,20 +386,23 @@ pub fn seconds(robot: &RobotModel, path: &SearchPath) -> f64 {
     (path.length() + standing_turn_cost(robot) * turned(path)) / robot.base.speed
 }
 
-/// The postures and a way out of the one at an end, where no way that is there already leads out of it.
+/// The postures without steps at an end that jump over obstacles, and with a way out of the one there where none leads out of it.
 fn with_way_out<const W: usize>(collider: &Collider<'_, W>, end: End, pose: Pose2, query: &Query) -> Option<Postures> {
     if end == End::Goal && (query.goal_yaw.is_none() || query.goal_within > 0.0) {
         return None;
     }
     let postures = &collider.postures;
     let free = collider.free(&BaseMotion { from: pose, to: pose });
-    let (from, to) = postures.shut_in(&collider.neighbours, end, free)?;
+    let passes = collider.passes(pose);
+    let WayOut { blocked, shut_in } = postures.way_out(&collider.neighbours, end, free, &passes)?;
+    let Some((from, to)) = shut_in else { return (!blocked.is_empty()).then(|| postures.without(&blocked)) };
     let to: Vec<Vec<f64>> = to.into_iter().map(|posture| postures.joints(posture).to_vec()).collect();
     let from = postures.joints(from);
-    let way = Escape::new(collider.robot(), from, collider.standing(pose)).way(from, &to)?;
+    // With none the others stay: the base may drive off meanwhile.
+    let way = Escape::new(collider.robot(), from, &passes).way(from, &to)?;
     // Half of the room that is left for each end.
     let room = (64 * W - postures.count()) / if end == End::Start { 2 } else { 1 };
-    Some(postures.with_way(&way, room))
+    Some(postures.without(&blocked).with_way(&way, room))
 }
 
 /// Postures that are free in a pose and agree with what is asked for.
@@ -429,84 +432,4 @@ fn goal_postures<const W: usize>(collider: &Collider<'_, W>, query: &Query) -> O
 pub(super) fn goal_headings(query: &Query) -> Vec<f64> {
     let any = || (0..lattice::HEADINGS as i32).map(lattice::heading_angle).collect();
     query.goal_yaw.map_or_else(any, |yaw| vec![yaw])
-}
-
-/// The route with the joints' path: states after each piece, those that only continue the one before left out.
-fn with_joints<const W: usize>(
-    collider: &Collider<'_, W>,
-    robot: &RobotModel,
-    query: &Query,
-    checked: &CheckedRoute<W>,
-    pieces: &[BaseMotion],
-    [start_postures, goal_postures]: [Bits<W>; 2],
-    expanded: usize,
-) -> SearchPath {
-    let masks = checked.masks();
-    let rates: Vec<usize> =
-        pieces.iter().map(|piece| collider.postures.steps_within(robot, time_of(robot, piece))).collect();
-    // The optimiser's curves need some room to swing within the ranges, too.
-    let open = (0..robot.joints.len()).filter(|m| query.start_joints[*m].or(query.goal_joints[*m]).is_none());
-    let brinks = collider.postures.brinks(open);
-    let ends = [start_postures, goal_postures];
-    let postures = joints::choose(&collider.neighbours, collider.postures.count(), &masks, &rates, ends, brinks)
-        .expect("the checked route passes postures from start to goal");
-    let exact = |asked: &[Option<f64>], posture: usize| -> Vec<f64> {
-        asked.iter().zip(collider.postures.joints(posture)).map(|(a, own)| a.unwrap_or(*own)).collect()
-    };
-    let first = postures[0];
-    let mut path = SearchPath {
-        states: vec![SearchState { pose: query.start, joints: exact(&query.start_joints, first) }],
-        moves: Vec::new(),
-        expanded,
-    };
-    path.then_to(
-        SearchState { pose: query.start, joints: collider.postures.joints(first).to_vec() },
-        SearchMove::Still,
-    );
-    let drive_reverse = reverse_of_pieces(&checked.route, pieces);
-    for (k, piece) in pieces.iter().enumerate() {
-        let kind = match drive_reverse[k] {
-            None => SearchMove::Still,
-            Some(false) => SearchMove::Forward,
-            Some(true) => SearchMove::Reverse,
-        };
-        path.then_to(SearchState { pose: piece.to, joints: collider.postures.joints(postures[k + 1]).to_vec() }, kind);
-    }
-    let last = postures[postures.len() - 1];
-    let end = path.states[path.states.len() - 1].pose;
-    let yaw = query.goal_yaw.map_or(end.yaw, |yaw| end.yaw + wrap_angle(yaw - end.yaw));
-    let [x, y] = if query.goal_within > 0.0 { [end.x, end.y] } else { [query.goal.x, query.goal.y] };
-    let end = Pose2 { x, y, yaw };
-    path.states.last_mut().expect("never empty").pose = end;
-    path.then_to(SearchState { pose: end, joints: exact(&query.goal_joints, last) }, SearchMove::Still);
-    if path.moves.is_empty() {
-        let only = path.states[0].clone();
-        path.states.push(only);
-        path.moves.push(SearchMove::Still);
-    }
-    path
-}
-
-/// Per piece: `None` for a turn, else whether it backs up.
-fn reverse_of_pieces(route: &Route, pieces: &[BaseMotion]) -> Vec<Option<bool>> {
-    let mut drive = 0;
-    let mut out = Vec::with_capacity(pieces.len());
-    for piece in pieces {
-        let driving = piece.from.distance(piece.to) > 0.0;
-        // A drive of no length only keeps two turns apart.
-        while driving && route.corners[drive] == route.corners[drive + 1] {
-            drive += 1;
-        }
-        out.push(driving.then(|| route.reverse[drive]));
-        if driving && route.corners[drive + 1] == [piece.to.x, piece.to.y] {
-            drive += 1;
-        }
-    }
-    out
-}
-
-/// Time that the base takes through a piece at least, s.
-fn time_of(robot: &RobotModel, piece: &BaseMotion) -> f64 {
-    piece.from.distance(piece.to) / robot.base.speed
-        + (piece.to.yaw - piece.from.yaw).abs() / robot.base.angular_speed.max(1e-6)
 }

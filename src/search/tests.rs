@@ -1,5 +1,7 @@
 //! The search against brute force, and on maps that ask for one posture or another.
 
+mod between;
+
 use super::lattice::{HEADINGS, Lattice, LatticeState};
 use super::*;
 use crate::math::real;
