@@ -218,7 +218,9 @@ fn unreadable(path: &Path, error: &io::Error, named_by: Option<&Span>) -> Diagno
             (format!("no such file: `{name}`{why}"), hint)
         }
         io::ErrorKind::IsADirectory => {
-            let inside = names(path, |kind| kind.is_file());
+            let mut inside = names(path, |kind| kind.is_file());
+            // What is about the files comes last.
+            inside.sort_by_key(|name| name.ends_with(".md"));
             let shown: Vec<String> = inside.iter().take(4).map(|name| format!("`{name}`")).collect();
             let such = if shown.is_empty() { String::new() } else { format!(", such as {}", shown.join(", ")) };
             (format!("`{name}` is a folder, expected a file"), format!("name the file in it{such}"))

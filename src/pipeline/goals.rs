@@ -110,7 +110,9 @@ impl Goals {
                 let stand = format!(
                     "; for link `{name}` the base at ({x:.3}, {y:.3}), heading {heading:.0} degrees, was tried first"
                 );
-                faults.iter_mut().for_each(|fault| fault.message += &stand);
+                // What is wrong with the start is so for all of them.
+                let of_goal = faults.iter_mut().filter(|fault| fault.code != "search/start-blocked");
+                of_goal.for_each(|fault| fault.message += &stand);
             }
             Diagnostics(faults)
         })

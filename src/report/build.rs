@@ -222,7 +222,8 @@ impl From<&CommandTable> for CommandsPart {
             rows: table.rows.len(),
             sampling_time_s: table.sampling_time,
             sampling: names::sampling(table.sampling).into(),
-            duration_s: table.duration(),
+            // To the nanosecond: sums of a tenth have a tail.
+            duration_s: (table.duration() * 1e9).round() / 1e9,
         }
     }
 }

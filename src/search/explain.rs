@@ -18,8 +18,8 @@ const MOST_LOOKS: usize = 256;
 const NEARBY: f64 = 1.0;
 /// How much thinner the robot is made, beyond having no clearance left, to find where a way would be; m.
 const THINNER: f64 = 0.3;
-/// Halvings of what is missing: to about a millimetre.
-const HALVINGS: usize = 8;
+/// Halvings of what is missing: to about a millimetre; with a roadmap, which takes longer, to a centimetre.
+const HALVINGS: [usize; 2] = [8, 5];
 /// Labels that the lattice search may make for a thinner robot.
 const QUICK: usize = 60_000;
 /// Labels that it may make for the base alone of a robot with many joints.
@@ -198,7 +198,7 @@ fn tightest<const W: usize>(solver: &Solver<'_, W>) -> Option<Tightest> {
     let clearance = solver.problem.options.clearance;
     let (mut too_little, mut enough) = (0.0, clearance + THINNER);
     let mut path = way_with_less(solver, enough)?;
-    for _ in 0..HALVINGS {
+    for _ in 0..HALVINGS[usize::from(!solver.collider.postures.is_exhaustive())] {
         let less = 0.5 * (too_little + enough);
         match way_with_less(solver, less) {
             Some(better) => (path, enough) = (better, less),
