@@ -62,9 +62,6 @@ pub fn cases() -> Vec<Case> {
             .found("`base_link` cannot come to (3.400, 1.500, 1.200)").expected("m off").hint("change `position_m`"),
         goal("link_in_obstacle", "link: {name: base_link, position_m: [1.95, 1.5, 0]}").exit(1).at(MISSION, "goal")
             .found("the goal is in collision").expected("the base at (1.950, 1.500)").hint("nearest free pose"),
-        goal("link_start_in_obstacle", "link: {name: base_link, position_m: [3.4, 1.5, 0]}")
-            .edit(MISSION, START, "x_m: 1.95, y_m: 1.4, yaw: 0deg").exit(1).at(MISSION, "start").found("the start is in collision")
-            .expected("are missing").hint("nearest free pose"),
         goal("link_and_place", "x_m: 3.4, link: {name: base_link, position_m: [3.4, 1.5, 0]}").at(MISSION, "x_m: 3.4")
             .found("`goal.x_m`").expected("exclude each other").hint("remove `x_m`, or `link`"),
         goal("link_without_place", "link: {name: base_link}").at(MISSION, "link: {").found("`position_m`").expected("is missing")
