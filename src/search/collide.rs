@@ -45,13 +45,8 @@ impl BaseMotion {
     fn parts(&self) -> [Base; PARTS] {
         let middle: Base = self.middle().into();
         std::array::from_fn(|k| {
-            let share = (k as f64 + 0.5) / PARTS as f64;
-            let mix = |a: f64, b: f64| a + share * (b - a);
-            let [a, b] = [&self.from, &self.to];
-            if a.yaw == b.yaw {
-                return middle.moved_to(mix(a.x, b.x), mix(a.y, b.y));
-            }
-            Pose2::new(mix(a.x, b.x), mix(a.y, b.y), mix(a.yaw, b.yaw)).into()
+            let pose = self.at((k as f64 + 0.5) / PARTS as f64);
+            if self.from.yaw == self.to.yaw { middle.moved_to(pose.x, pose.y) } else { pose.into() }
         })
     }
 }

@@ -15,6 +15,11 @@ const LOOK: f64 = 0.02;
 /// ... but there are no more looks than these.
 const MOST_LOOKS: f64 = 500.0;
 
+/// Looks at a way on which a shape moves so far, m.
+fn looks(farthest: f64) -> usize {
+    (farthest / LOOK).ceil().clamp(1.0, MOST_LOOKS) as usize
+}
+
 impl<const W: usize> Collider<'_, W> {
     /// Tells whether the straight way from one posture to another keeps the clearance of the moving shapes, the base standing: looked at
     /// so closely that no shape moves farther than [`LOOK`] unseen. The first posture is not looked at.
@@ -41,7 +46,7 @@ impl<const W: usize> Collider<'_, W> {
             let at_risk = |(placed, moved): &(&Placed, f64)| !far(placed, &Posed::new(&after[placed.shape]), *moved);
             let at_risk: Vec<(&Placed, f64)> = self.moving.iter().zip(travels).filter(at_risk).collect();
             let farthest = at_risk.iter().map(|(_, moved)| *moved).fold(0.0, f64::max);
-            let looks = (farthest / LOOK).ceil().clamp(1.0, MOST_LOOKS) as usize;
+            let looks = looks(farthest);
             at_risk.is_empty()
                 || (1..=looks).rev().all(|k| {
                     let poses = self.robot.shape_poses(&between(a, b, k as f64 / looks as f64));
@@ -64,7 +69,7 @@ impl<const W: usize> Collider<'_, W> {
         move |a, b| {
             let [before, after] = [a, b].map(|joints| self.robot.shape_poses(joints));
             let farthest = self.travels(&before, &after).into_iter().fold(0.0, f64::max);
-            let looks = (farthest / LOOK).ceil().clamp(1.0, MOST_LOOKS) as usize;
+            let looks = looks(farthest);
             clears(a, b) && (1..=looks).rev().all(|k| apart(&between(a, b, k as f64 / looks as f64)))
         }
     }
